@@ -1,0 +1,1 @@
+"""Two-link arms as a load for trajopt."""

@@ -1,0 +1,43 @@
+"""Servo trajectories by direct transcription: optimal, checked and certified.
+
+    solution = trajopt.solve(trajopt.load("move.toml"))
+
+Importing trajopt loads no solver, model or plotting library; each comes when it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "load": "trajopt.problem_file",
+    "from_dict": "trajopt.problem_file",
+    "solve": "trajopt.solving",
+    "route": "trajopt.routing",
+    "check": "trajopt.checker",
+    "check_file": "trajopt.checker",
+    "Solution": "trajopt.solution",
+    "Verdict": "trajopt.verdict",
+    **dict.fromkeys(
+        ("Problem", "Move", "State", "Via", "Limits", "Load", "Objective", "Term", "Transcription"),
+        "trajopt.problem",
+    ),
+    **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
+    **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
+    **dict.fromkeys(("Norm", "L1", "L2", "Linf"), "norms"),
+}
+
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'trajopt' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,194 @@
+"""One program solved once: a problem on a mesh, transcribed, run, and read back as a trajectory or a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import norms
+from trajopt.model import Claim, Outcome
+from trajopt.objective import Lowered, lower
+from trajopt.problem import DERIVATIVES, Objective, Problem, Term
+from trajopt.rebuild import rebuild
+from trajopt.trajectory import Trajectory
+from trajopt.transcribe import Setting, Transcript, transcribe
+
+
+class Clock:
+    """Seconds left of a wall-time limit, and where the time went."""
+
+    def __init__(self, seconds: float | None = None) -> None:
+        self._started = perf_counter()
+        self._seconds = seconds
+        self.spent: dict[str, float] = {}
+
+    def left(self) -> float | None:
+        """Seconds until the limit, at least a hundredth; None without a limit."""
+        return None if self._seconds is None else max(self._seconds - (perf_counter() - self._started), 0.01)
+
+    @property
+    def over(self) -> bool:
+        """Whether the limit has passed."""
+        return self._seconds is not None and perf_counter() - self._started >= self._seconds
+
+    def charge(self, what: str, since: float) -> None:
+        """Add the time since ``since`` to an account."""
+        self.spent[what] = self.spent.get(what, 0.0) + perf_counter() - since
+
+    def timings(self) -> dict[str, float]:
+        """All accounts, and the total, in s."""
+        return {**self.spent, "total": perf_counter() - self._started}
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of one run: the outcome, the trajectory read from it, and the value and bound of the objective, SI."""
+
+    outcome: Outcome
+    trajectory: Trajectory | None = None
+    value: float = np.nan
+    bound: float = -np.inf
+    slope: float = np.nan  # SI objective per unit of the program's
+    notes: dict[str, Any] = field(default_factory=dict)  # prices; starts and agreed; held by a tie-break; programs
+    size: float = 1.0  # of the objective, SI
+    convex: bool = True
+
+    @property
+    def gap(self) -> float:
+        """(value - bound)/|value|, for a value near zero over a hundred-thousandth of the objective's size."""
+        return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
+
+
+Goal = Callable[[Transcript], Lowered]
+
+
+def convex(
+    setting: Setting,
+    duration: float,
+    goal: Goal,
+    clock: Clock,
+    solver: str = "clarabel",
+    widen: Sequence[str] = (),
+) -> Attempt:
+    """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
+    run is optimal within 1e-7 by our own bound, or infeasible by a checked certificate.
+
+    The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable (see
+    `trajopt.transcribe.transcribe`).
+    """
+    from trajopt.model_cvxpy import LADDER, RESCUE, ConvexModel
+
+    best: Attempt | None = None
+    for rung in LADDER if solver == "clarabel" else (solver,):
+        if rung == RESCUE and best is not None and best.gap <= 1e-6:
+            break
+        since = perf_counter()
+        model = ConvexModel()
+        by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+        transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
+        lowered = goal(transcript)
+        model.minimize(lowered.expression)
+        clock.charge("model", since)
+        since = perf_counter()
+        outcome = model.run(rung, clock.left())
+        clock.charge("solve", since)
+        attempt = _read(setting, transcript, lowered, outcome)
+        if attempt.gap <= 1e-7 or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
+            return attempt
+        if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
+            best = attempt
+        if clock.over:
+            break
+    assert best is not None
+    return best
+
+
+def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory) -> Attempt:
+    """A local optimum by Ipopt, from a starting trajectory; the duration is free where the problem leaves it free."""
+    from trajopt.model_pyomo import NonconvexModel
+
+    since = perf_counter()
+    model = NonconvexModel()
+    duration: Any = setting.problem.move.fixed_time
+    if duration is None:
+        duration = _free_duration(setting, model, start.duration)
+    transcript = transcribe(setting, model, duration)
+    for x, values in zip(transcript.chain, start.chain, strict=True):
+        model.start(x, values)
+    lowered = goal(transcript)
+    model.minimize(lowered.expression)
+    clock.charge("model", since)
+    since = perf_counter()
+    outcome = model.run("ipopt", clock.left())
+    clock.charge("solve", since)
+    return _read(setting, transcript, lowered, outcome)
+
+
+def _free_duration(setting: Setting, model: Any, start: float) -> Any:
+    """A duration that the model chooses, within its range, scaled, and started at ``start`` s."""
+    time, size = setting.problem.move.time, setting.sizes.duration
+    shortest, longest = time if isinstance(time, tuple) else (0.01 * size, np.inf)
+    free = model.vector(1, size, np.array([shortest]), np.array([longest]))
+    model.start(free, np.array([start]))
+    return free[0]
+
+
+def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:
+    """The Lagrangian, at the attempt's primal and dual vector, of its program with another duration."""
+    model: Any
+    if attempt.convex:
+        from trajopt.model_cvxpy import ConvexModel
+
+        model = ConvexModel()
+    else:
+        from trajopt.model_pyomo import NonconvexModel
+
+        model = NonconvexModel()
+    transcript = transcribe(setting, model, duration)
+    model.minimize(goal(transcript).expression)
+    assert attempt.outcome.pair is not None
+    return float(model.lagrangian(attempt.outcome.pair))
+
+
+def _read(setting: Setting, transcript: Transcript, lowered: Lowered, outcome: Outcome) -> Attempt:
+    if outcome.claim not in (Claim.OPTIMAL, Claim.INACCURATE):
+        return Attempt(outcome)
+    model = transcript.model
+    duration = transcript.duration if isinstance(transcript.duration, float) else model.value(transcript.duration)
+    values = [model.value(x) for x in transcript.chain]
+    if not all(np.all(np.isfinite(x)) for x in values):
+        return Attempt(Outcome(Claim.FAILED, outcome.raw_status + ", with non-finite values"))
+    start = np.array([x[0] for x in values[:-1]])
+    trajectory = rebuild(
+        setting.problem, setting.mesh, setting.scheme, setting.sizes, float(duration), start, values[-1]
+    )
+    return Attempt(
+        outcome,
+        trajectory,
+        lowered.si(outcome.value),
+        lowered.si(outcome.bound),
+        lowered.slope(outcome.value),
+        size=lowered.scale,
+        convex=model.convex,
+    )
+
+
+def to(objective: Objective) -> Goal:
+    """The goal of minimising an objective."""
+    return lambda transcript: lower(transcript, objective)
+
+
+def smoothest(problem: Problem) -> Objective:
+    """The L2 norm of the top derivative: strictly convex, so that its minimiser is one and the same everywhere."""
+    return Objective(terms=(Term(minimize=DERIVATIVES[problem.order], norm=norms.L2()),))
+
+
+def unlimited(setting: Setting, duration: float) -> Trajectory:
+    """The smoothest move between the prescribed states without any limit: a start for local solvers."""
+    top = np.zeros(setting.mesh.intervals)
+    start = np.zeros(setting.problem.order)
+    return rebuild(setting.problem, setting.mesh, setting.scheme, setting.sizes, duration, start, top)

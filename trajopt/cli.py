@@ -1,0 +1,148 @@
+"""The command line: ``trajopt solve | check | route | problems``."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.exceptions import TyperException
+
+from trajopt.errors import BadInput, InternalError, TrajoptError
+from trajopt.verdict import Verdict
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help=("Servo trajectories by direct transcription: optimal, checked and certified."),
+)
+
+Source = Annotated[str, typer.Argument(metavar="FILE", help="a problem file, or the name of a ready-made problem")]
+Overrides = Annotated[
+    list[str], typer.Option("--set", metavar="KEY=VALUE", help='override a dotted key, e.g. move.end.position="0.3 m"')
+]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object and nothing else")]
+
+
+@app.command()
+def solve(
+    source: Source,
+    overrides: Overrides = [],  # noqa: B006 (typer reads the default)
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="write CSV, JSON and PNG into this folder")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit, s")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Solve a problem; exits 0 only with a checked answer."""
+    from trajopt import preflight, problem_file
+    from trajopt.worker import solve_apart
+
+    if seconds is not None and not 0.1 <= seconds <= 1e6:
+        raise BadInput(f"--seconds must be 0.1 to 1e6, got {seconds:g}")
+    problem = problem_file.load(source, overrides)
+    for warning in preflight.warnings(problem):
+        print(f"warning: {warning}", file=sys.stderr)
+    solution = solve_apart(problem, seconds)
+    written = solution.save(output) if output is not None else []
+    if as_json:
+        print(json.dumps(solution.to_dict(), allow_nan=False))
+    else:
+        from trajopt.report import print_solution
+
+        print_solution(solution)
+        for path in written:
+            print(f"wrote {path}")
+    raise typer.Exit(solution.status.exit_code)
+
+
+@app.command()
+def route(source: Source, overrides: Overrides = [], as_json: AsJson = False) -> None:  # noqa: B006
+    """Say which model and solver would take a problem, and why, without solving it."""
+    from trajopt import problem_file, routing
+
+    chosen = routing.route(problem_file.load(source, overrides))
+    print(json.dumps(chosen.to_dict()) if as_json else f"{chosen.model} with {chosen.solver}: {chosen.reason}")
+
+
+@app.command()
+def check(
+    result: Annotated[Path, typer.Argument(help="a result.json")],
+    problem: Annotated[str | None, typer.Option("--problem", help="the problem it must belong to")] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="limits to 1e-9, in rational arithmetic")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Check a written result without the optimiser; exits 0 when it passes."""
+    from trajopt import checker
+
+    stated = None
+    if problem is not None:
+        from trajopt import problem_file
+
+        stated = problem_file.load(problem).canonical()
+    try:
+        report = checker.check_file(result, stated, strict=strict)
+    except checker.CheckerInputError as error:
+        raise BadInput(str(error)) from None
+    print(json.dumps(report.to_dict()) if as_json else report.summary())
+    raise typer.Exit(0 if report.passed else 3)
+
+
+@app.command()
+def problems(as_json: AsJson = False) -> None:
+    """List the ready-made problems."""
+    from trajopt import problem_file
+
+    known = {name: problem_file.load(path) for name, path in problem_file.ready_made().items()}
+    if as_json:
+        print(json.dumps({name: {"title": p.title, "source": p.source, "moral": p.moral} for name, p in known.items()}))
+        return
+    width = max(len(name) for name in known)
+    for name, p in known.items():
+        print(f"{name:{width}}  {p.title}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line. Every failure is one line on stderr, and an exit code (see `trajopt.verdict`)."""
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        code = app(args=words, prog_name="trajopt", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        _fail("INTERRUPTED", "stopped by the user", 130, words)
+    except TyperException as error:
+        usage = error.format_message() if hasattr(error, "format_message") else str(error)
+        _fail("BAD_INPUT", f"{usage} (see trajopt --help)", 2, words)
+    except InternalError as error:
+        _fail("CRASHED", f"a bug in trajopt: {error}; the traceback is in {_keep(error)}", 70, words)
+    except TrajoptError as error:
+        _fail("BAD_INPUT" if error.exit_code == 2 else "UNDECIDED", str(error), error.exit_code, words)
+    except OSError as error:
+        _fail("UNDECIDED", f"{error.filename or 'output'}: {error.strerror or error}", 4, words)
+    except Exception as error:
+        _fail("CRASHED", f"a bug in trajopt: {error!r}; the traceback is in {_keep(error)}", 70, words)
+    else:
+        if code == Verdict.INTERRUPTED.exit_code:  # typer turns Ctrl-C into this
+            _fail("INTERRUPTED", "stopped by the user", code, words)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(status: str, message: str, code: int, words: list[str]) -> None:
+    print(f"trajopt: {' '.join(message.split())}", file=sys.stderr)
+    if "--json" in words:
+        print(json.dumps({"status": status, "message": message}))
+    sys.stdout.flush()
+    sys.exit(code)
+
+
+def _keep(error: BaseException) -> str:
+    handle, path = tempfile.mkstemp(prefix="trajopt-bug-", suffix=".txt")
+    with os.fdopen(handle, "w") as file:
+        notes: list[Any] = getattr(error, "__notes__", [])
+        file.write("".join([*traceback.format_exception(error), *map(str, notes)]))
+    return path

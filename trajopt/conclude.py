@@ -1,0 +1,107 @@
+"""From an attempt to a solution: metrics, certificate, and the independent check, without which nothing is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt import checker
+from trajopt.attempt import Attempt, Clock
+from trajopt.errors import InternalError
+from trajopt.explain import explain
+from trajopt.metrics import metrics
+from trajopt.model import Claim
+from trajopt.routing import Route, nonaffine_limits
+from trajopt.solution import Solution
+from trajopt.transcribe import Setting, without
+from trajopt.verdict import Verdict
+
+GAP: Final = 1e-6  # relative: a checked answer within it of its lower bound is solved
+_VERDICTS: Final = {Claim.INFEASIBLE: Verdict.IMPOSSIBLE_ON_GRID, Claim.LIMIT: Verdict.LIMIT}
+
+
+def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, local: bool = False) -> Solution:
+    """The solution that an attempt amounts to, once the independent check has spoken.
+
+    With a gap above GAP it is SOLVED_LOCAL where ``local`` says that a local optimum will do, else UNDECIDED. Raises
+    InternalError when the lower bound lies above a checked answer.
+    """
+    problem, outcome = setting.problem, attempt.outcome
+    if attempt.trajectory is None:
+        return _unsolved(setting, chosen, attempt, clock)
+    trajectory = replace(attempt.trajectory, problem=problem)
+    value = trajectory.measure(problem.objective)
+    if "held" in attempt.notes:  # the optimum itself, which the smoother profile holds within that share
+        value = attempt.value
+    certificate = _certificate(value, attempt)
+    verdict = Verdict.SOLVED if certificate["gap"] is not None and certificate["gap"] <= GAP else Verdict.SOLVED_LOCAL
+    found = metrics(trajectory)
+    candidate = Solution(
+        verdict, problem, chosen, value, trajectory.duration, found, certificate, trajectory=trajectory
+    )
+    since = perf_counter()
+    report = checker.check(candidate.to_dict())
+    clock.charge("check", since)
+    audit, message = report.to_dict(), ""
+    if not report.passed:
+        message = f"{outcome.raw_status}, but the check found: {'; '.join(audit['failed'])}"
+    elif verdict is Verdict.SOLVED_LOCAL and not local:
+        message = f"{outcome.raw_status}, but the gap to the lower bound is {certificate['gap']}"
+    if message:
+        return Solution(Verdict.UNDECIDED, problem, chosen, audit=audit, timings=clock.timings(), message=message)
+    return replace(candidate, audit=audit, prices=attempt.notes.get("prices", ()), timings=clock.timings())
+
+
+def first_solved(
+    setting: Setting, candidates: Iterable[tuple[Attempt, Route]], clock: Clock, local: bool = False
+) -> Solution:
+    """The conclusion of the first candidate that passes, or of the last."""
+    solution = None
+    for attempt, chosen in candidates:
+        solution = conclude(setting, chosen, attempt, clock, local)
+        if solution.status.solved or attempt.trajectory is None:
+            break
+    assert solution is not None
+    return solution
+
+
+def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -> Solution:
+    """A verdict without numbers. A move that is impossible in its time, or the longest of its range, is explained."""
+    problem, outcome = setting.problem, attempt.outcome
+    status, explanation = _VERDICTS.get(outcome.claim, Verdict.UNDECIDED), {}
+    longest = problem.move.time[1] if isinstance(problem.move.time, tuple) else problem.move.fixed_time
+    if status is Verdict.IMPOSSIBLE_ON_GRID and longest is not None:
+        since = perf_counter()
+        move = problem.move.model_copy(update={"time": longest})
+        longest_move = replace(setting, problem=problem.model_copy(update={"move": move}))
+        explanation = explain(without(longest_move, nonaffine_limits(problem)), clock)
+        if explanation["continuous"]:
+            status = Verdict.IMPOSSIBLE
+        elif problem.load.coulomb and problem.limits.force is not None:
+            status, explanation = Verdict.UNDECIDED, {}
+        clock.charge("explain", since)
+    message = explanation["text"][0] if explanation else outcome.raw_status
+    if status is Verdict.UNDECIDED and problem.load.coulomb:
+        message += "; the program takes friction at rest for friction in motion"
+    return Solution(status, problem, chosen, explanation=explanation, timings=clock.timings(), message=message)
+
+
+def _certificate(value: float, attempt: Attempt) -> dict[str, Any]:
+    """Lower bound, gap and what the bound is about; for a local optimum also how many starts agreed on it.
+
+    Raises InternalError when the bound lies above the answer.
+    """
+    starts: dict[str, Any] = {key: attempt.notes[key] for key in ("starts", "agreed") if key in attempt.notes}
+    bound = attempt.bound
+    if not np.isfinite(bound):
+        return {"lower_bound": None, "gap": None, "bounds": "no bound known: a local optimum", **starts}
+    gap = (value - bound) / max(abs(value), 1e-300)
+    if gap < -1e-6:
+        raise InternalError(f"lower bound {bound!r} above the answer {value!r}")
+    between = attempt.trajectory is not None and attempt.trajectory.scheme.terms > 1
+    about = "every move on this mesh" + (" whose Bernstein coefficients keep the limits" if between else "")
+    return {"lower_bound": min(bound, value), "gap": max(gap, 0.0), "bounds": about, **starts}

@@ -1,0 +1,215 @@
+"""How the values of a problem are read: numbers with units, tables over time, limits; refused in engineer's words."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+
+from trajopt import units
+from trajopt.units import shown
+
+LONGEST_TABLE: Final = 10_000
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+def si(value: Any, kind: str, info: ValidationInfo) -> float:
+    """One SI number from a float (code) or a text with a unit (file)."""
+    context = info.context or {}
+    rotary = bool(context.get("rotary"))
+    wanted = units.kinds(rotary)[kind]
+    if isinstance(value, str):
+        return units.to_si(value, kind, rotary)
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise ValueError(f"{shown(value)} is not {units.article(wanted.name)}; write for example {wanted.example!r}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"must be finite, got {value!r}; leave the key out where there is no limit")
+    if context.get("texts_only"):
+        raise ValueError(f"{shown(value)} has no unit; write for example {wanted.example!r}")
+    size: Any = abs(value)
+    if not size <= units.LARGEST:
+        raise ValueError(f"must be finite and at most 1e30 in size, got {shown(value)}")
+    return float(value)
+
+
+def sequence(value: Any, what: str) -> list[Any]:
+    if isinstance(value, str | Mapping) or not hasattr(value, "__iter__"):
+        raise ValueError(f"{what} must be a list, got {shown(value)}")
+    values = list(value)
+    if len(values) > LONGEST_TABLE:
+        raise ValueError(f"{what} must be a list of at most {LONGEST_TABLE} values, got {len(values)}")
+    return values
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """``; did you mean 'limits'?`` or the list of what is known."""
+    close = difflib.get_close_matches(name[:80].lower(), known, n=1, cutoff=0.5)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known: {', '.join(known)}" if known else ""
+
+
+def refuse_unknown(given: Mapping[Any, Any], known: Sequence[str]) -> None:
+    for key in given:
+        if key not in known:
+            raise ValueError(f"unknown key {shown(key)}{nearest(str(key), known)}")
+
+
+def positive(kind: str) -> BeforeValidator:
+    def read(value: Any, info: ValidationInfo) -> float:
+        number = si(value, kind, info)
+        if number <= 0:
+            raise ValueError(f"must be > 0, got {shown(value)}")
+        return number
+
+    return BeforeValidator(read)
+
+
+def nonnegative(kind: str) -> BeforeValidator:
+    def read(value: Any, info: ValidationInfo) -> float:
+        number = si(value, kind, info)
+        if number < 0:
+            raise ValueError(f"must be 0 or more, got {shown(value)}")
+        return number
+
+    return BeforeValidator(read)
+
+
+class Table(Section):
+    """A value that varies over the move: piecewise linear in time, constant outside the table."""
+
+    time: tuple[float, ...]
+    value: tuple[float, ...]
+
+    def at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The values at times ``t`` in s."""
+        return np.interp(t, self.time, self.value)
+
+
+def read_table(value: Any, kind: str, column: str, info: ValidationInfo) -> Table:
+    """A Table from ``{time = [...], <column> = [...]}``."""
+    example = units.kinds(bool((info.context or {}).get("rotary")))[kind].example
+    for key, text in (("time", "0.5 s"), (column, example)):
+        if value.get(key) is None:
+            raise ValueError(f'{key}: is missing; write time = ["0 s", "1 s"] and {column} = ["{example}", ...]')
+        if not isinstance(value[key], list | tuple | np.ndarray):
+            raise ValueError(f'{key}: must be a list such as ["{text}", ...], got {shown(value[key])}')
+    times = [si(t, "time", info) for t in sequence(value["time"], "time")]
+    values = [si(x, kind, info) for x in sequence(value[column], column)]
+    if len(times) != len(values) or len(times) < 2:
+        raise ValueError(f"needs as many values as times, at least two; got {len(times)} times, {len(values)} values")
+    for i, (earlier, later) in enumerate(zip(times, times[1:], strict=False), 1):
+        if later <= earlier:
+            raise ValueError(f"time: must increase, got {value['time'][i - 1]!r} and then {value['time'][i]!r}")
+    return Table(time=tuple(times), value=tuple(values))
+
+
+class Limit(Section):
+    """What a signal must stay within, at every instant: ``min`` and ``max``, each a number, a Table or no limit."""
+
+    min: float | Table | None = None
+    max: float | Table | None = None
+
+    def at(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+        """Lower and upper limit at times ``t`` in s; None where there is none."""
+
+        def side(limit: float | Table | None) -> NDArray[np.float64] | None:
+            if limit is None:
+                return None
+            return limit.at(t) if isinstance(limit, Table) else np.full(np.shape(t), float(limit))
+
+        return side(self.min), side(self.max)
+
+    @property
+    def lowest(self) -> float:
+        """The smallest value allowed at any time (-inf without a lower limit)."""
+        return -math.inf if self.min is None else min(self.min.value) if isinstance(self.min, Table) else self.min
+
+    @property
+    def highest(self) -> float:
+        """The largest value allowed at any time (inf without an upper limit)."""
+        return math.inf if self.max is None else max(self.max.value) if isinstance(self.max, Table) else self.max
+
+    @property
+    def varies(self) -> bool:
+        """Whether the limit depends on time."""
+        return isinstance(self.min, Table) or isinstance(self.max, Table)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the limit is plus-minus one value (or one table)."""
+        if isinstance(self.min, Table) and isinstance(self.max, Table):
+            mirrored = tuple(-x for x in self.max.value)
+            return self.min.time == self.max.time and self.min.value == mirrored
+        return isinstance(self.min, float) and isinstance(self.max, float) and self.min == -self.max
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times at which the limit has a corner, in s."""
+        return tuple(t for side in (self.min, self.max) if isinstance(side, Table) for t in side.time)
+
+
+def read_limit(kind: str) -> BeforeValidator:
+    def read(value: Any, info: ValidationInfo) -> Limit | None:
+        if value is None or isinstance(value, Limit):
+            return value if value is None else _checked(value, value)
+        if isinstance(value, Mapping):
+            return _limit_table(dict(value), kind, info)
+        if isinstance(value, str | int | float):
+            bound = si(value, kind, info)
+            if bound <= 0:
+                raise ValueError(
+                    f"must be > 0 (one value means plus-minus), got {shown(value)}; leave the key out for no limit"
+                )
+            return Limit(min=-bound, max=bound)
+        pair = sequence(value, "a limit with more than one value")
+        if len(pair) != 2:
+            raise ValueError(f"needs one value (plus-minus) or a pair [min, max], got {len(pair)} values")
+        return _checked(Limit(min=si(pair[0], kind, info), max=si(pair[1], kind, info)), value)
+
+    return BeforeValidator(read)
+
+
+def _limit_table(value: dict[str, Any], kind: str, info: ValidationInfo) -> Limit:
+    refuse_unknown(value, ("time", "value", "min", "max"))
+    if "value" in value:
+        if "min" in value or "max" in value:
+            raise ValueError("give either value (plus-minus), or min and max, not both")
+        upper = read_table(value, kind, "value", info)
+        lower = Table(time=upper.time, value=tuple(-x for x in upper.value))
+        return _checked(Limit(min=lower, max=upper), value)
+    if value.get("time") is None:
+        sides = {side: _side(value[side], kind, info) for side in ("min", "max") if value.get(side) is not None}
+    else:
+        sides = {side: read_table(value, kind, side, info) for side in ("min", "max") if value.get(side) is not None}
+    if not sides:
+        raise ValueError("is empty; give min, max or both, or leave the key out for no limit")
+    return _checked(Limit(**sides), value)
+
+
+def _side(value: Any, kind: str, info: ValidationInfo) -> float | Table:
+    if isinstance(value, Table):
+        return value
+    if isinstance(value, Mapping):
+        refuse_unknown(value, ("time", "value"))
+        return read_table(dict(value), kind, "value", info)
+    return si(value, kind, info)
+
+
+def _checked(limit: Limit, value: Any) -> Limit:
+    times = np.array(limit.breakpoints or (0.0,))
+    lower, upper = limit.at(times)
+    if not all(np.all(np.isfinite(side)) for side in (lower, upper) if side is not None):
+        raise ValueError("must be finite; leave a side out where there is no limit")
+    if lower is not None and upper is not None and np.any(lower >= upper):
+        pair = f"min {value[0]!r} and max {value[1]!r}" if isinstance(value, list | tuple) else shown(value)
+        raise ValueError(f"min must be below max at all times, got {pair}; swap or widen them")
+    return limit

@@ -1,0 +1,109 @@
+"""What an engineer reads off a move, exact between the nodes: peaks, root mean squares, energy, path length."""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from trajopt.mesh import Floats
+from trajopt.problem import DERIVATIVES
+from trajopt.signals import Signal, product
+from trajopt.trajectory import Trajectory
+
+
+def metrics(trajectory: Trajectory) -> dict[str, float]:
+    """Peaks and RMS of velocity to the top derivative, distance ∫|v|dt; with a load force, power and energy ∫|P|dt.
+
+    SI. For the Euler scheme, values at the nodes and their sums (energy by the trapezoidal rule, as in Table II).
+    """
+    if trajectory.problem.load.coulomb and trajectory.scheme.terms > 1:
+        trajectory = trajectory.cut(_reversals(trajectory))  # friction jumps where the velocity changes its sign
+    names = [*DERIVATIVES[1 : trajectory.order + 1]]
+    if trajectory.problem.load.inertia is not None:
+        names += ["force", "power"]
+    found: dict[str, float] = {}
+    for name in names:
+        signal = trajectory.signal(name)
+        found[f"peak_{name}"] = peak(signal)
+        found[f"rms_{name}"] = rms(trajectory, signal)
+    found["distance"] = absolute_integral(trajectory, trajectory.signal("velocity"), plain=True)
+    if "power" in names:
+        found["energy"] = absolute_integral(trajectory, trajectory.signal("power"))
+    return found
+
+
+def peak(signal: Signal) -> float:
+    """max|x| at every instant, or at the nodes where only they mean something."""
+    if not signal.pieces:
+        return float(np.max(np.abs(signal.nodes)))
+    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    best = float(np.max(np.abs(pieces[[0, -1]])))
+    doubtful = np.flatnonzero(np.max(np.abs(pieces), axis=0) > best)  # a polynomial lies within its coefficients
+    for k in doubtful:
+        power = _power_form(pieces[:, k])
+        inside = _roots_inside(polynomial.polyder(power))
+        best = max([best, *np.abs(polynomial.polyval(inside, power))])
+    return float(best)
+
+
+def rms(trajectory: Trajectory, signal: Signal) -> float:
+    """sqrt((1/T)∫x²dt)."""
+    if not signal.pieces:
+        return float(np.sqrt(np.trapezoid(np.square(signal.nodes), trajectory.time) / trajectory.duration))
+    square = product(trajectory.transcript.model, signal, signal)
+    return float(np.sqrt(np.sum(_integrals(trajectory, square)) / trajectory.duration))
+
+
+def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = False) -> float:
+    """∫|x|dt; for the Euler scheme the trapezoidal rule, or (plain) the rectangles it integrates with."""
+    if not signal.pieces:
+        x = np.abs(signal.nodes)
+        return float(np.diff(trajectory.time) @ x[:-1] if plain else np.trapezoid(x, trajectory.time))
+    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    total = np.abs(_integrals(trajectory, signal))
+    steps = np.diff(trajectory.time)
+    for k in np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0)):
+        power = polynomial.polyint(_power_form(pieces[:, k]))
+        ends = np.concatenate([[0.0], np.sort(_roots_inside(polynomial.polyder(power))), [1.0]])
+        total[k] = steps[k] * np.abs(np.diff(polynomial.polyval(ends, power))).sum()
+    return float(np.sum(total))
+
+
+def _reversals(trajectory: Trajectory) -> Floats:
+    """The times at which the velocity changes its sign between nodes, s."""
+    pieces = np.stack(trajectory.signal("velocity").pieces)
+    time = trajectory.time
+    found = [
+        time[k] + _roots_inside(_power_form(pieces[:, k])) * (time[k + 1] - time[k])
+        for k in np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
+    ]
+    return np.concatenate([np.empty(0), *found])
+
+
+def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
+    """(N,) the integral over each interval: its length times the mean Bernstein coefficient."""
+    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    integrals: Floats = np.diff(trajectory.time) * pieces.mean(axis=0)
+    return integrals
+
+
+def _power_form(bernstein: Floats) -> Floats:
+    """Power coefficients, lowest first, from Bernstein coefficients on [0, 1]."""
+    n = len(bernstein) - 1
+    power = np.zeros(n + 1)
+    for i, b in enumerate(bernstein):
+        for j in range(i, n + 1):
+            power[j] += (-1.0) ** (j - i) * comb(n, j) * comb(j, i) * b
+    return power
+
+
+def _roots_inside(power: Any) -> Floats:
+    size = np.max(np.abs(power), initial=0.0)
+    if size == 0.0:
+        return np.empty(0)
+    roots = polynomial.polyroots(polynomial.polytrim(power, 1e-14 * size))
+    real = roots[np.abs(roots.imag) < 1e-9].real if len(roots) else roots.real
+    return real[(real > 0) & (real < 1)]

@@ -1,0 +1,91 @@
+"""What a model must offer so that one constraint builder serves all: residuals, never comparisons.
+
+A model is short-lived: built by `trajopt.transcribe`, solved once, and gone. Expressions are opaque to the builder;
+they support ``+``, ``-``, slices, and products with a scalar. All other operations go through the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from norms import Rows
+
+Floats = NDArray[np.float64]
+
+
+class Claim(Enum):
+    """What a solver says of its own work; a claim, never an answer."""
+
+    OPTIMAL = "optimal"
+    INACCURATE = "inaccurate"
+    INFEASIBLE = "infeasible"
+    UNBOUNDED = "unbounded"
+    LIMIT = "limit"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Prices:
+    """The multipliers of the rows of one side of a limit: ``at`` (n,) fractions of the duration, ``per_unit`` (n,) the
+    change of the objective per SI unit by which the limit gives way there, ``own`` (n,) the limit itself (see
+    `trajopt.transcribe.profile`)."""
+
+    at: Floats
+    per_unit: Floats
+    own: Floats
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of one solver run: its claim, its own word for it, objective value, iterations and seconds."""
+
+    claim: Claim
+    raw_status: str
+    value: float = np.nan
+    iterations: int = 0
+    seconds: float = 0.0
+    bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
+    prices: dict[str, Prices] = field(default_factory=dict)
+    pair: tuple[Floats, Floats] | None = None  # the primal and dual vector, for `Model.lagrangian`
+
+
+class Model(Rows, Protocol):
+    """The builder's view of a backend."""
+
+    convex: bool
+
+    def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
+        """(count,) variables of the given size, with bounds (infinite where none) known to the solver as bounds.
+
+        ``name`` and ``at`` (count,) fractions of the duration are for their prices."""
+
+    def zero(self, residual: Any, size: float = 1.0) -> None:
+        """Demand ``residual == 0``; ``size`` scales the row."""
+
+    def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> Any:
+        """Demand ``residual <= 0``; rows with a name have prices, at fractions ``at`` of the duration."""
+
+    def times(self, factor: Any, x: Any) -> Any:
+        """The elementwise product of a constant (scalar or vector), or in a nonconvex model any expression, and x."""
+
+    def minimize(self, value: Any) -> None:
+        """Set the objective, a scalar of size about one."""
+
+    def value(self, x: Any) -> Floats:
+        """The floats of an expression after a run."""
+
+    def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
+        """The Lagrangian of this program at another's primal and dual vector; its slope in a parameter is a price."""
+
+    def run(self, solver: str, seconds: float | None = None) -> Outcome:
+        """Hand the program to a solver. Never raises for a failed solve; raises MissingSolver."""
+
+
+def own_size(bound: Floats, size: float) -> Floats:
+    """What a limit is measured in when widened or priced: its own value, or the signal's size where it is zero."""
+    return np.abs(bound) if np.all(bound) else np.full(len(bound), size)

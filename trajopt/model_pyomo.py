@@ -1,0 +1,206 @@
+"""Nonconvex models: Pyomo with Debian's Ipopt, in process through PyNumero. The only file that imports pyomo."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Final
+
+import numpy as np
+import pyomo.environ as pyo
+
+from trajopt.errors import MissingSolver
+from trajopt.model import Claim, Floats, Outcome, Prices, own_size
+from trajopt.signals import Signal
+
+_OPTIONS: Final = {
+    "tol": 1e-10,
+    "constr_viol_tol": 1e-10,
+    "compl_inf_tol": 1e-11,  # the default of 1e-4 leaves peaks 1e-5 too high
+    "acceptable_tol": 1e-8,
+    "bound_relax_factor": 0.0,  # the default lets variables leave their bounds by 1e-8
+    "mumps_pivot_order": 4,  # PORD: the default took 51 s instead of 0.7 s on a model with one dense column
+    "max_iter": 3000,
+    "print_level": 0,
+    "sb": "yes",
+}
+_CLAIMS: Final = {  # all others, local infeasibility among them, are failures: they prove nothing
+    0: Claim.OPTIMAL,
+    1: Claim.OPTIMAL,  # acceptable, which is set to 1e-8
+    -1: Claim.LIMIT,
+    -4: Claim.LIMIT,
+}
+
+
+class NonconvexModel:
+    """A nonlinear program under construction; see `trajopt.model.Model` for the meaning of the methods."""
+
+    convex = False
+
+    def __init__(self) -> None:
+        self._model = pyo.ConcreteModel()
+        self._model.rows = pyo.ConstraintList()
+        self._vectors: list[tuple[Any, Any, float]] = []
+        self._named: list[tuple[str, list[Any], float, Floats, Floats]] = []
+        self._contradiction = ""
+
+    def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
+        def bounds(_: Any, k: int) -> tuple[float | None, float | None]:
+            low, high = float(lower[k]) / size, float(upper[k]) / size
+            return (low if np.isfinite(low) else None), (high if np.isfinite(high) else None)
+
+        variables = pyo.Var(range(count), bounds=bounds)
+        x = self._add(variables, count, size, name)
+        if at is not None:
+            self._bounded(variables, name, size, (lower, upper), at)
+        return x
+
+    def variable(self, count: int) -> Any:
+        return self._add(pyo.Var(range(count), initialize=1.0), count, 1.0)
+
+    def _bounded(self, variables: Any, name: str, size: float, bounds: tuple[Floats, Floats], at: Floats) -> None:
+        for side, bound in (("min", bounds[0]), ("max", bounds[1])):
+            active = np.flatnonzero(np.isfinite(bound))
+            if len(active):
+                some = [variables[int(k)] for k in active]
+                self._named.append((f"{name}.{side}", some, size, at[active], own_size(bound[active], size)))
+
+    def _add(self, variables: Any, count: int, size: float, name: str = "") -> Any:
+        self._model.add_component(name or f"x{len(self._vectors)}", variables)
+        x = np.empty(count, dtype=object)
+        x[:] = [size * variables[k] for k in range(count)]
+        self._vectors.append((x, variables, size))
+        return x
+
+    def start(self, x: Any, values: Floats) -> None:
+        """Start Ipopt from these values (SI) of a vector of variables."""
+        variables, size = next((v, s) for y, v, s in self._vectors if y is x)
+        for k, value in enumerate(values):
+            low, high = variables[k].bounds
+            scaled = max(float(value) / size, -np.inf if low is None else low)
+            variables[k].set_value(min(scaled, np.inf if high is None else high))
+
+    def zero(self, residual: Any, size: float = 1.0) -> None:
+        for row in np.atleast_1d(residual):
+            self._row(row, size, equality=True)
+
+    def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> Any:
+        rows = [self._row(row, size, equality=False) for row in np.atleast_1d(residual)]
+        if name and None not in rows:
+            self._named.append((name, rows, size, at, own))
+
+    def _row(self, row: Any, size: float, equality: bool) -> Any:
+        if isinstance(row, float):  # nothing to decide: it holds or the problem contradicts itself
+            if row > 1e-9 * size or (equality and row < -1e-9 * size):
+                self._contradiction = f"a constant row is off by {row:g}"
+            return None
+        scaled = row * (1 / size)
+        return self._model.rows.add(scaled == 0 if equality else scaled <= 0)
+
+    def times(self, factor: Any, x: Any) -> Any:
+        if isinstance(factor, np.ndarray) or isinstance(x, np.ndarray):
+            return np.multiply(np.asarray(factor, dtype=object), np.asarray(x, dtype=object))
+        return factor * x
+
+    def concatenate(self, parts: list[Any]) -> Any:
+        return np.concatenate(parts)
+
+    def total(self, weights: Floats, x: Any) -> Any:
+        return pyo.quicksum(float(w) * y for w, y in zip(weights, x, strict=True))
+
+    def squares(self, x: Any) -> Any:
+        return x * x
+
+    def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
+        self.nonpositive(-bound)
+        self.nonpositive(self.total(np.square(weights), x * x) - bound * bound)
+
+    def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
+        """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a velocity over its size, smoothed
+        over w = 1e-3 so that Ipopt can follow."""
+        smooth = np.empty(len(velocity.nodes), dtype=object)
+        smooth[:] = [x / (x * x + 1e-6) ** 0.5 for x in velocity.nodes * (1 / size)]
+        return smooth, (smooth[:-1], smooth[1:])
+
+    def minimize(self, value: Any) -> None:
+        self._model.objective = pyo.Objective(expr=value)
+
+    def value(self, x: Any) -> Any:
+        if isinstance(x, np.ndarray):
+            return np.array([float(pyo.value(y)) for y in x])
+        return float(pyo.value(x))
+
+    def run(self, solver: str = "ipopt", seconds: float | None = None) -> Outcome:
+        """Solve by Ipopt from the start given; a claim of a local optimum at best.
+
+        Raises MissingSolver when Ipopt or its interface is not installed.
+        """
+        started = perf_counter()
+        if self._contradiction:
+            return Outcome(Claim.FAILED, self._contradiction)
+        nlp, problem, deadline = _interface(self._model, seconds)
+        for option, setting in _OPTIONS.items():
+            problem.add_option(option, setting)
+        x, info = problem.solve(nlp.init_primals())
+        status = int(info["status"])
+        claim = Claim.LIMIT if deadline.passed else _CLAIMS.get(status, Claim.FAILED)
+        message = info["status_msg"].decode().partition(":")[0].partition(" (")[0]
+        for variable, value in zip(nlp.get_pyomo_variables(), x, strict=True):
+            variable.set_value(float(value), skip_validation=True)
+        seconds, pair = perf_counter() - started, (np.asarray(x), np.asarray(info["mult_g"]))
+        prices = self._prices(nlp, info)
+        return Outcome(claim, message, float(info["obj_val"]), deadline.iterations, seconds, prices=prices, pair=pair)
+
+    def _prices(self, nlp: Any, info: Any) -> dict[str, Prices]:
+        """The prices of named rows and bounds, from Ipopt's multipliers."""
+        multipliers: dict[Any, float] = {
+            id(row): m for row, m in zip(nlp.get_pyomo_constraints(), info["mult_g"], strict=True)
+        }
+        for side in ("mult_x_L", "mult_x_U"):
+            multipliers |= {(id(v), side): m for v, m in zip(nlp.get_pyomo_variables(), info[side], strict=True)}
+        found: dict[str, list[tuple[Floats, Floats, Floats]]] = {}
+        for name, rows, size, at, own in self._named:
+            side = "mult_x_L" if name.endswith("min") else "mult_x_U"
+            values = [multipliers.get(id(row), multipliers.get((id(row), side), 0.0)) for row in rows]
+            found.setdefault(name, []).append((at, np.array(values) / size, own))
+        return {name: Prices(*map(np.concatenate, zip(*parts, strict=True))) for name, parts in found.items()}
+
+    def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
+        nlp, _, _ = _interface(self._model, None)
+        nlp.set_primals(pair[0])
+        return float(nlp.evaluate_objective() + pair[1] @ nlp.evaluate_constraints())
+
+
+class _Deadline:
+    """Ipopt's callback after each iteration: stops at a wall time, which Debian's Ipopt cannot do by itself."""
+
+    def __init__(self, seconds: float | None) -> None:
+        self._end = None if seconds is None else perf_counter() + seconds
+        self.passed = False
+        self.iterations = 0
+
+    def __call__(self, _nlp: Any, _mode: int, iteration: int, *_: Any) -> bool:
+        self.iterations = iteration
+        self.passed = self._end is not None and perf_counter() > self._end
+        return not self.passed
+
+
+def _interface(model: Any, seconds: float | None) -> tuple[Any, Any, _Deadline]:
+    from pyomo.contrib.pynumero.asl import AmplInterface
+
+    library = Path(sys.prefix) / "lib" / "libpynumero_ASL.so"
+    if library.exists():  # compiled into the environment by the set-up, where PyNumero does not look
+        AmplInterface.libname = str(library)
+    try:
+        from pyomo.contrib.pynumero.interfaces.cyipopt_interface import CyIpoptNLP
+        from pyomo.contrib.pynumero.interfaces.pyomo_nlp import PyomoNLP
+
+        nlp = PyomoNLP(model)
+        deadline = _Deadline(seconds)
+        return nlp, CyIpoptNLP(nlp, intermediate_callback=deadline), deadline
+    except (ImportError, RuntimeError) as error:
+        raise MissingSolver(
+            "Ipopt is not available: install Debian's coinor-libipopt-dev and libamplsolver-dev, then run 'make demo'"
+            f" ({' '.join(str(error).split())[:200]})"
+        ) from error

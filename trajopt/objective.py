@@ -1,0 +1,101 @@
+"""The objective of a transcribed problem: lowered to an expression of size one, and measured on floats in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import norms
+from trajopt.mesh import Floats
+from trajopt.problem import Objective, Term
+from trajopt.transcribe import Transcript
+
+_ENERGY = norms.L1()
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """An objective on a model: ``expression`` to minimise, of size one; ``si`` maps its value to SI."""
+
+    expression: Any
+    scale: float
+    norm: norms.Norm | None  # of a single term, which is minimised through an easier increasing function
+
+    def si(self, value: float) -> float:
+        """The SI objective, from a value of the expression (or a bound on it)."""
+        if self.norm is None:
+            return self.scale * value
+        unit = self.norm.value_alone(1.0)
+        return self.scale / unit * self.norm.value_alone(value) if np.isfinite(value) else value
+
+    def slope(self, value: float) -> float:
+        """The derivative of `si`."""
+        step = 1e-6 * max(abs(value), 1e-12)
+        return (self.si(value + step) - self.si(value - step)) / (2 * step)
+
+    def expression_value(self, si: float) -> float:
+        """The value of the expression, from the SI objective: the inverse of `si`."""
+        return si / self.scale if self.norm is None else self.norm.alone(si / self.scale)
+
+
+def lower(transcript: Transcript, objective: Objective) -> Lowered:
+    """The objective as a scalar expression; its rows go to the transcript's model."""
+    model = transcript.model
+    measured = [_Measured.of(transcript, term) for term in objective.terms]
+    if len(measured) == 1 and (norm := measured[0].norm) is not None:
+        only = measured[0]
+        expression = norm.lower_alone(model, only.samples * (1 / only.size), only.weights, only.duration)
+        return Lowered(expression * (1 / norm.alone(only.unit)), only.weight * only.size * only.unit, norm)
+    scale = sum(m.weight * m.size * m.unit for m in measured)
+    total: Any = 0.0
+    for m in measured:
+        value = m.duration if m.norm is None else m.norm.lower(model, m.samples * (1 / m.size), m.weights, m.duration)
+        total = total + value * (m.weight * (m.size if m.norm is not None else 1.0) / scale)
+    return Lowered(total, scale, None)
+
+
+def measure(transcript: Transcript, objective: Objective) -> float:
+    """The SI value of an objective on a transcript whose chain and duration are floats."""
+    total = 0.0
+    for m in (_Measured.of(transcript, term) for term in objective.terms):
+        value = m.duration if m.norm is None else m.norm.measure(m.samples, m.weights, m.duration)
+        total += m.weight * float(value)
+    return total
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A term laid on the mesh: its samples, what each stands for, and its sizes."""
+
+    samples: Any
+    weights: Floats
+    duration: Any  # s, or 1 for the plain sums of the Euler scheme
+    norm: norms.Norm | None  # None: the term is the duration itself
+    weight: float
+    size: float  # of the samples, SI
+    unit: float  # the norm of samples that are all one
+
+    @classmethod
+    def of(cls, transcript: Transcript, term: Term) -> _Measured:
+        duration, sizes = transcript.duration, transcript.sizes
+        if term.minimize == "time":
+            return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, 1.0)
+        energy = term.minimize == "energy"
+        quantity = "power" if energy else term.minimize
+        signal = transcript.quantities.signal(quantity)
+        weights = transcript.scheme.weights(signal, transcript.mesh)
+        typical = sizes.duration
+        if transcript.scheme.terms == 1:  # Euler: plain sums, as in the paper; but an energy stays an integral
+            if energy:
+                weights = weights / transcript.mesh.intervals
+            else:
+                duration = typical = 1.0
+        samples = signal.samples(transcript.model)
+        if quantity == "position" and transcript.problem.move.start_position is None:
+            samples = samples - transcript.chain[0][0]  # positions are absolute then; the norm is of the displacement
+        norm = _ENERGY if energy else term.norm
+        assert norm is not None
+        unit = norm.measure(np.ones(len(weights)), weights, typical)
+        return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), unit)

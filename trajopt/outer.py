@@ -1,0 +1,110 @@
+"""A relaxation that every continuous move satisfies: what it cannot do, no mesh and no control can.
+
+Between nodes each limited derivative may do anything within its limits. An interval then sees it only through its
+moments ∫(t1-s)^(r-1)/(r-1)! x(s) ds and ∫(s-t0)^(r-1)/(r-1)! x(s) ds, each within [lower, upper]·h^r/r!. The moments
+are what Taylor's formula leaves of the lower derivatives, forward and backward. Infeasibility of this program is
+impossibility in continuous time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import factorial
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt.attempt import Clock
+from trajopt.fields import Limit
+from trajopt.mesh import Floats
+from trajopt.model import Claim
+from trajopt.problem import DERIVATIVES, Problem
+from trajopt.transcribe import Setting, node_limits, prescribed
+
+_CERTAIN: Final = 1e-9  # relative widening: below it rounding could be the reason
+
+
+def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
+    """Whether no continuous move of this duration meets the kinematic limits and states, by a checked certificate.
+
+    All limits are widened together by the least factor that makes the program feasible: when even our lower bound on
+    that factor is positive, the move is impossible. (Feasibility as such is too hard a question near the edge.)
+    """
+    from trajopt.model_cvxpy import LADDER, ConvexModel
+
+    setting = replace(setting, problem=_with_force_as_acceleration(setting.problem))
+    for rung in LADDER:
+        model = ConvexModel()
+        by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf))[0]
+        _rows(setting, duration, model, by)
+        model.minimize(by)
+        outcome = model.run(rung, clock.left())
+        if outcome.claim is Claim.INFEASIBLE or outcome.bound > _CERTAIN:
+            return True
+        if outcome.claim is Claim.OPTIMAL:
+            return False
+    return False
+
+
+def _with_force_as_acceleration(problem: Problem) -> Problem:
+    """The problem with the acceleration limit that its force limit implies: a = (F - viscous·v - coulomb)/inertia."""
+    limits, load, way = problem.limits, problem.load, problem.one_way
+    if limits.force is None or not isinstance(load.inertia, float) or (load.coulomb and not way):
+        return problem
+    slowest, fastest = (limits.velocity.lowest, limits.velocity.highest) if limits.velocity else (-np.inf, np.inf)
+    drag = [load.viscous * v if load.viscous else 0.0 for v in (slowest, fastest)]
+    low = (limits.force.lowest - drag[1] - way * load.coulomb) / load.inertia
+    high = (limits.force.highest - drag[0] - way * load.coulomb) / load.inertia
+    if limits.acceleration is not None:
+        low, high = max(low, limits.acceleration.lowest), min(high, limits.acceleration.highest)
+    if load.coulomb:  # at rest friction takes any value up to Coulomb's, and the axis may stay
+        low, high = min(low, 0.0), max(high, 0.0)
+    implied = Limit(min=low if np.isfinite(low) else None, max=high if np.isfinite(high) else None)
+    return problem.model_copy(update={"limits": limits.model_copy(update={"acceleration": implied})})
+
+
+def _rows(setting: Setting, duration: float, model: Any, by: Any) -> None:
+    problem, mesh, sizes = setting.problem, setting.mesh, setting.sizes
+    order, steps = problem.order, mesh.steps * duration
+    free = np.full(mesh.intervals + 1, np.inf)
+    chain = [model.vector(mesh.intervals + 1, sizes.derivative[i], -free, free) for i in range(order)]
+    for node, i, value in prescribed(problem, mesh):
+        model.zero(chain[i][node] - value, sizes.derivative[i])
+    for i in range(order + 1):
+        limit = getattr(problem.limits, DERIVATIVES[i])
+        if limit is None:
+            continue
+        if i < order:
+            lower, upper = node_limits(problem, i, mesh, duration)
+            _within(model, chain[i], lower, upper, sizes.derivative[i], by, 1.0)
+        for r in range(1, i + 1):
+            weight = steps**r / factorial(r)
+            for moment in (_forward(model, chain, steps, i, r), _backward(model, chain, steps, i, r)):
+                lower, upper = weight * limit.lowest, weight * limit.highest
+                _within(model, moment, lower, upper, sizes.derivative[i - r], by, sizes.derivative[i] * weight)
+
+
+def _within(model: Any, x: Any, lower: Floats, upper: Floats, size: float, by: Any, unit: Any) -> None:
+    """``x`` within limits that are widened ``by`` times their own value (``by`` times ``unit`` where that is zero)."""
+    for bound, sign in ((lower, -1.0), (upper, 1.0)):
+        active = np.flatnonzero(np.isfinite(bound))
+        if len(active):
+            some = x if len(active) == len(bound) else x[active]
+            wide = np.where(bound[active], np.abs(bound[active]), np.broadcast_to(unit, bound.shape)[active])
+            model.nonpositive(sign * (some - bound[active]) - by * wide, size)
+
+
+def _forward(model: Any, chain: list[Any], steps: Any, i: int, r: int) -> Any:
+    """(N,) ∫(t1-s)^(r-1)/(r-1)! x_i ds: what Taylor's formula at the left node leaves of x_(i-r) at the right one."""
+    rest = chain[i - r][1:]
+    for p in range(r):
+        rest = rest - model.times(steps**p / factorial(p), chain[i - r + p][:-1])
+    return rest
+
+
+def _backward(model: Any, chain: list[Any], steps: Any, i: int, r: int) -> Any:
+    """(N,) ∫(s-t0)^(r-1)/(r-1)! x_i ds: the same backwards in time."""
+    rest = chain[i - r][:-1]
+    for p in range(r):
+        rest = rest - model.times((-steps) ** p / factorial(p), chain[i - r + p][1:])
+    return -rest if r % 2 else rest

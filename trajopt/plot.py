@@ -1,0 +1,289 @@
+"""Figures of a solution: stacked panels of position and its derivatives, force and power, with their limits.
+
+One look for every figure: Okabe-Ito colours, which colour-blind readers tell apart and printers keep; limits as thin
+grey dashes; intervals on which a limit is active shaded. Curves are the exact interpolant, not lines between samples.
+"""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Mapping
+from itertools import cycle
+from math import comb
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from trajopt import units
+from trajopt.errors import NoSolution
+from trajopt.fields import Limit
+from trajopt.mesh import Floats
+from trajopt.problem import DERIVATIVES, FREE
+from trajopt.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from trajopt.solution import Solution
+
+COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe-Ito
+SHADE: Final = "#F0E442"  # its yellow: too light for a line
+GREY: Final = "0.35"
+POINTS: Final = 4000  # about as many samples a curve, shared among the intervals
+ACTIVE: Final = 1e-6  # of the limit: closer than this, for longer than an interval, it is active
+ACTIVE_LOAD: Final = 1e-3  # the same for force and power: at a limit they sag between nodes, by the curvature of a step
+IN_VIEW: Final = 1.6  # times the height of the curves: a limit farther off is named instead of shown
+
+
+class Panels(list[Axes]):
+    """The axes, top panel first. A notebook shows their figure."""
+
+    @property
+    def figure(self) -> Figure:
+        """The figure they belong to."""
+        figure = self[0].figure
+        assert isinstance(figure, Figure)
+        return figure
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.figure.savefig(buffer, format="png", dpi=110)
+        return buffer.getvalue()
+
+
+def plot(solution: Solution) -> Panels:
+    """Stacked panels of one solution, limits dashed and shaded where active, the objective in the title.
+
+    Power has a panel when there is a load, force when it is limited or minimised. Raises NoSolution.
+    """
+    from trajopt.report import objective_text
+
+    trajectory = _moved(solution)
+    names = _names(trajectory)
+    panels = _panels(names, trajectory)
+    for axes, name in zip(panels, names, strict=True):
+        time, values = curve(trajectory, name)
+        limit = _limit(trajectory, name)
+        if limit is not None:
+            close = _close(time, values, limit, ACTIVE if name in DERIVATIVES else ACTIVE_LOAD)
+            top = name == DERIVATIVES[trajectory.order]
+            _shade(axes, time, close, shortest=(0.99 if top else 1.5) * float(np.min(np.diff(trajectory.time))))
+        axes.plot(time, values, color=COLOURS[0], linewidth=1.6, label=name)
+        _finish(axes, name, [trajectory])
+    _title(panels, solution.problem.title or "Trajectory", pad=18)
+    _note(panels[0], f"minimised {_pretty(objective_text(solution))}", "left", 8)
+    return panels
+
+
+def plot_prices(solution: Solution) -> Axes:
+    """The prices of the limits and of the time as bars: what 1 % more of each does to the objective, per cent.
+
+    Raises NoSolution.
+    """
+    from trajopt.report import objective_label
+
+    _moved(solution)
+    rows = [price for price in reversed(solution.prices) if price["per_percent"] is not None]
+    figure = Figure(figsize=(7.0, 1.2 + 0.4 * max(len(rows), 1)), layout="constrained")
+    axes = figure.subplots()
+    values = [100 * row["per_percent"] for row in rows]
+    bars = axes.barh([row["name"] for row in rows], values, color=COLOURS[0], height=0.6)
+    axes.bar_label(bars, labels=[f"{value:+.3g} %" for value in values], padding=4, fontsize=9)
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.margins(x=0.2)
+    axes.set_xlabel(f"change of {objective_label(solution)} [%] for 1 % more")
+    axes.set_title(solution.problem.title or "Prices", loc="left", fontweight="bold")
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(left=False)
+    return axes
+
+
+def compare(
+    solutions: Mapping[str, Solution], dashed: Mapping[str, Solution] | None = None, title: str = ""
+) -> Panels:
+    """The same panels with several solutions, named in a legend; ``dashed`` ones take the same colours again.
+
+    Raises NoSolution when one of them has no trajectory, ValueError when there is none at all.
+    """
+    if not solutions:
+        raise ValueError("needs at least one solution to compare")
+    solid = {label: _moved(solution) for label, solution in solutions.items()}
+    second = {label: _moved(solution) for label, solution in (dashed or {}).items()}
+    shown = [*solid.values(), *second.values()]
+    present = {name for trajectory in shown for name in _names(trajectory)}
+    names: list[str] = [name for name in (*DERIVATIVES, "force", "power") if name in present]
+    panels = _panels(names, shown[0])
+    for axes, name in zip(panels, names, strict=True):
+        for style, group in (("solid", solid), ((0, (3, 1.2)), second)):
+            looks = zip(cycle(COLOURS), _widths(len(group)), group.items(), strict=False)
+            for colour, width, (label, trajectory) in looks:
+                if name in _names(trajectory):
+                    axes.plot(*curve(trajectory, name), color=colour, linestyle=style, linewidth=width, label=label)
+        _finish(axes, name, shown)
+    _legend(panels, len(solid), len(second))
+    if title:
+        _title(panels, title, pad=8)
+    return panels
+
+
+def _widths(count: int) -> list[float]:
+    """Line widths that fall, so that a curve shows behind another that coincides with it."""
+    return [float(width) for width in np.linspace(1.4 + 0.4 * min(count - 1, 3), 1.4, count)]
+
+
+def _legend(panels: Panels, solid: int, second: int) -> None:
+    """The names below the panels; dashed ones, when there are as many, each under the solid one of its colour."""
+    handles, labels = panels[0].get_legend_handles_labels()
+    order = list(range(solid + second))
+    if solid == second:
+        order = [i + group * solid for i in range(solid) for group in (0, 1)]  # a legend fills its columns first
+    panels.figure.legend([handles[i] for i in order], [labels[i] for i in order], loc="outside lower center",
+                         ncols=min(solid, 4), frameon=False, fontsize=8)
+
+
+def curve(trajectory: Trajectory, name: str) -> tuple[Floats, Floats]:
+    """Times (s) and values (SI) of a signal, by the exact interpolant: jumps of the top derivative stay vertical.
+
+    Where only the nodes mean something (Euler, friction that changes sign) those.
+    """
+    signal = trajectory.signal(name)
+    origin = trajectory.origin if name == "position" else 0.0
+    if not signal.pieces:
+        return trajectory.time, signal.nodes + origin
+    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    count = 2 if signal.degree == 0 else int(np.clip(POINTS // trajectory.mesh.intervals, 2, 200))
+    fractions = np.linspace(0.0, 1.0, count)
+    n = signal.degree
+    basis = np.array([comb(n, i) * fractions**i * (1 - fractions) ** (n - i) for i in range(n + 1)])
+    time = trajectory.time[:-1, None] + np.diff(trajectory.time)[:, None] * fractions
+    return time.ravel(), np.asarray((pieces.T @ basis).ravel() + origin)
+
+
+def _moved(solution: Solution) -> Trajectory:
+    if solution.trajectory is None:
+        raise NoSolution(f"{solution.status.value}: {solution.message or solution.status.advice}")
+    return solution.trajectory
+
+
+def _names(trajectory: Trajectory) -> list[str]:
+    """The panels that a trajectory fills, top first."""
+    problem = trajectory.problem
+    names: list[str] = [*DERIVATIVES[: trajectory.order + 1]]
+    if problem.load.inertia is not None:
+        wanted = problem.limits.force is not None or any(term.minimize == "force" for term in problem.objective.terms)
+        names += ["force", "power"] if wanted else ["power"]
+    return names
+
+
+def _panels(names: list[str], trajectory: Trajectory) -> Panels:
+    """Empty stacked axes that share the time axis, with units in their labels."""
+    kinds = units.kinds(trajectory.problem.rotary)
+    figure = Figure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained", facecolor="white")
+    panels = Panels(figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0])
+    for axes, name in zip(panels, names, strict=True):
+        axes.set_ylabel(f"{kinds[name].name}\n[{_pretty(kinds[name].unit)}]", fontsize=8)
+        axes.tick_params(labelsize=8, color=GREY)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.spines[["left", "bottom"]].set_color(GREY)
+        axes.grid(color="0.92", linewidth=0.7)
+        axes.set_axisbelow(True)
+    panels[-1].set_xlabel("time [s]", fontsize=8)
+    figure.align_ylabels(panels)
+    return panels
+
+
+def _title(panels: Panels, text: str, pad: float) -> None:
+    panels[0].set_title("\n".join(textwrap.wrap(text, 70)), loc="left", fontsize=11, fontweight="bold", pad=pad)
+
+
+def _pretty(unit: str) -> str:
+    return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
+
+
+def _limit(trajectory: Trajectory, name: str) -> Limit | None:
+    limit = getattr(trajectory.problem.limits, name)
+    assert limit is None or isinstance(limit, Limit)
+    return limit
+
+
+def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
+    """Limits, via states and axis ranges, once the curves are there."""
+    lowest, highest = low, high = _reach(axes)
+    room = (IN_VIEW - 1) * (high - low)
+    drawn: dict[bytes, None] = {}
+    far: list[float] = []
+    for trajectory in trajectories:
+        _mark_via(axes, name, trajectory)
+        for time, values in _limit_lines(trajectory, name):
+            if (key := time.tobytes() + values.tobytes()) in drawn:
+                continue
+            drawn[key] = None
+            axes.plot(time, values, color=GREY, linewidth=0.9, linestyle=(0, (6, 3)), label="_limit", zorder=1.5)
+            within = values[(values >= lowest - room) & (values <= highest + room)]
+            low, high = min([low, *within]), max([high, *within])
+            if not len(within):
+                far.append(float(values[np.argmin(np.abs(values))]))
+    margin = 0.06 * (high - low) or 0.06 * max(abs(high), 1.0)
+    axes.set_ylim(low - margin, high + margin)
+    axes.set_xlim(0.0, max(trajectory.duration for trajectory in trajectories))
+    if far:
+        unit = _pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
+        _note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
+
+
+def _numbers(values: list[float]) -> str:
+    """``±100`` or ``0.5, 5``."""
+    if len(values) == 2 and values[0] == -values[1]:
+        return f"±{abs(values[0]):.4g}"
+    return ", ".join(f"{x:.4g}" for x in values)
+
+
+def _note(axes: Axes, text: str, side: Literal["left", "right"], size: float) -> None:
+    """A line of small print above a panel."""
+    x = 0.0 if side == "left" else 1.0
+    axes.annotate(text, (x, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", ha=side, va="bottom",
+                  fontsize=size, color=GREY)
+
+
+def _reach(axes: Axes) -> tuple[float, float]:
+    """The smallest and largest value of the curves."""
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
+    return float(values.min()), float(values.max())
+
+
+def _limit_lines(trajectory: Trajectory, name: str) -> list[tuple[Floats, Floats]]:
+    """(time, value) of the lower and the upper limit, with every corner."""
+    limit = _limit(trajectory, name)
+    if limit is None:
+        return []
+    inside = [t for t in limit.breakpoints if 0 < t < trajectory.duration]
+    time = np.unique([0.0, *inside, trajectory.duration])
+    return [(time, side) for side in limit.at(time) if side is not None]
+
+
+def _close(time: Floats, values: Floats, limit: Limit, relative: float) -> NDArray[np.bool_]:
+    """Which samples lie at a limit, within a fraction of its size."""
+    sides = [side for side in limit.at(time) if side is not None]
+    size = max(float(np.max(np.abs(side))) for side in sides) or 1.0
+    return np.asarray(np.any([np.abs(values - side) <= relative * size for side in sides], axis=0))
+
+
+def _shade(axes: Axes, time: Floats, marked: NDArray[np.bool_], shortest: float) -> None:
+    """Mark stretches of ``shortest`` s or longer, over the height of the panel."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        if time[end - 1] - time[first] >= shortest:
+            axes.axvspan(time[first], time[end - 1], facecolor=SHADE, alpha=0.35, linewidth=0, zorder=0.5)
+
+
+def _mark_via(axes: Axes, name: str, trajectory: Trajectory) -> None:
+    """A ring at every value that a via state prescribes."""
+    if name not in DERIVATIVES[:4]:
+        return
+    given: list[tuple[float, Any]] = [(via.time, getattr(via, name)) for via in trajectory.problem.move.via]
+    points = [(time, value) for time, value in given if value is not None and value != FREE]
+    if points:
+        axes.plot(*zip(*points, strict=True), "o", color="black", markerfacecolor="white", markersize=5, label="_via")

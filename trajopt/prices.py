@@ -1,0 +1,95 @@
+"""Prices: what the objective would change by if a limit, or the time, gave way a little. From the multipliers.
+
+The price of a limit is the sum of the multipliers of its rows; that of the time is the slope of the Lagrangian in the
+duration, at the same primal and dual vector (the envelope theorem).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt import units
+from trajopt.attempt import Attempt, Goal, lagrangian
+from trajopt.problem import Problem
+from trajopt.transcribe import Setting
+
+_STEP: Final = 1e-4  # of the duration, for the central difference of the Lagrangian
+
+
+def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float) -> list[dict[str, Any]]:
+    """The prices of the limits and of the time, the most effective first; those of no effect are left out.
+
+    Each: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI objective
+    per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened by 1 %;
+    None for a limit that is zero).
+    """
+    found = _limits(setting.problem, attempt)
+    if (
+        setting.problem.move.fixed_time is not None
+        and (per_second := _time(setting, attempt, goal, duration)) is not None
+    ):
+        found["time"] = (per_second, per_second * duration)
+    return _ranked(setting.problem, found, value)
+
+
+def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> list[dict[str, Any]]:
+    """The prices of the limits for a least time: by how much each moves the farthest reach, over what time moves it."""
+    per_second = _time(setting, attempt, goal, duration)
+    if not per_second:
+        return []
+    found = {
+        name: (-unit / per_second, -own / per_second) for name, (unit, own) in _limits(setting.problem, attempt).items()
+    }
+    return _ranked(setting.problem, found, duration)
+
+
+def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]]:
+    """name -> (objective per SI unit of the limit, objective per unit of its own value)."""
+    found: dict[str, tuple[float, float]] = {}
+    for key, rows in attempt.outcome.prices.items():
+        quantity, _, side = key.partition(".")
+        symmetric = getattr(problem.limits, quantity).symmetric
+        name, outwards = (quantity, 1.0) if symmetric else (key, 1.0 if side == "max" else -1.0)
+        unit, own = found.get(name, (0.0, 0.0))
+        change = -rows.per_unit * attempt.slope
+        found[name] = (unit + outwards * float(np.sum(change)), own + float(change @ rows.own))
+    return found
+
+
+def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> float | None:
+    """The objective per second of duration; None where the mesh itself hangs on times in seconds."""
+    problem = setting.problem
+    if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.pair is None:
+        return None
+    if any(limit.varies for limit in problem.limits.given().values()):
+        return None
+    later, sooner = (lagrangian(setting, duration * (1 + s), goal, attempt) for s in (_STEP, -_STEP))
+    return attempt.slope * (later - sooner) / (2 * _STEP * duration)
+
+
+def _ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:
+    kinds = units.kinds(problem.rotary)
+    rows: list[dict[str, Any]] = []
+    for name, (unit, own) in found.items():
+        if value and abs(own) > 1e-7 * abs(value):
+            relative = None if _is_zero(problem, name) else own / 100 / value
+            rows.append(
+                {"name": name, "per_unit": unit, "unit": kinds[name.partition(".")[0]].unit, "per_percent": relative}
+            )
+    return sorted(rows, key=lambda row: -abs(row["per_percent"] or 0.0))
+
+
+def _is_zero(problem: Problem, name: str) -> bool:
+    """Whether a limit is zero, so that a percentage of it means nothing."""
+    quantity, _, side = name.partition(".")
+    return bool(side) and getattr(getattr(problem.limits, quantity), side) == 0.0
+
+
+def sentence(row: Mapping[str, Any], label: str) -> str:
+    """``+1 % jerk: -0.42 % peak power``."""
+    if row["per_percent"] is None:
+        return f"{row['name']}: {row['per_unit']:+.3g} {label} per {row['unit']}"
+    return f"+1 % {row['name']}: {100 * row['per_percent']:+.3g} % {label}"

@@ -1,0 +1,308 @@
+"""The problem: a move in continuous time, frozen, in SI units. Its fields are the sections of a problem file.
+
+Nothing here knows a mesh, a model or a solver. In code, numbers are SI floats (m or rad, kg or kg m², s, N or N m, W);
+in files they are texts with a unit (see `trajopt.units` and `trajopt.problem_file`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
+
+import norms
+from trajopt import units
+from trajopt.fields import (
+    Limit,
+    Section,
+    Table,
+    nearest,
+    nonnegative,
+    positive,
+    read_limit,
+    read_table,
+    refuse_unknown,
+    si,
+)
+from trajopt.units import shown
+
+DERIVATIVES: Final = ("position", "velocity", "acceleration", "jerk", "snap")
+FREE: Final = "free"
+MOST_INTERVALS: Final = 200_000
+
+
+def _or_free(value: Any, kind: str, info: ValidationInfo) -> float:
+    try:
+        return si(value, kind, info)
+    except ValueError as error:
+        raise ValueError(f'{error}, or "free"') from None
+
+
+def _state_value(kind: str) -> BeforeValidator:
+    def read(value: Any, info: ValidationInfo) -> float | str | None:
+        return value if value is None or value == FREE else _or_free(value, kind, info)
+
+    return BeforeValidator(read)
+
+
+class State(Section):
+    """A boundary or via state: each derivative a number, ``"free"``, or None for the default.
+
+    The default is zero for velocity, acceleration and (with a snap limit) jerk of a boundary state, and free for
+    those of a via state.
+    """
+
+    position: Annotated[float | Literal["free"] | None, _state_value("position")] = None
+    velocity: Annotated[float | Literal["free"] | None, _state_value("velocity")] = None
+    acceleration: Annotated[float | Literal["free"] | None, _state_value("acceleration")] = None
+    jerk: Annotated[float | Literal["free"] | None, _state_value("jerk")] = None
+
+    def fixed(self, order: int, default: float | None = 0.0) -> dict[int, float]:
+        """The prescribed derivatives below ``order``: number of the derivative -> SI value."""
+        values = {i: getattr(self, DERIVATIVES[i]) for i in range(order)}
+        values = {i: default if x is None else x for i, x in values.items()}
+        return {i: float(x) for i, x in values.items() if x is not None and x != FREE}
+
+
+class Via(State):
+    """A state to pass through at ``time`` (s); what is not given is free.
+
+    Raises ValueError when everything is free.
+    """
+
+    time: Annotated[float, positive("time")]
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not self.fixed(len(DERIVATIVES) - 1, None):
+            raise ValueError('gives no state to pass through; write for example position = "0.1 m"')
+        return self
+
+
+def _move_time(value: Any, info: ValidationInfo) -> Any:
+    if value == FREE:
+        return FREE
+    if isinstance(value, list | tuple):
+        if len(value) != 2:
+            raise ValueError(f'needs one time such as "1 s", a pair [min, max] or "free", got {len(value)} values')
+        shortest, longest = (si(t, "time", info) for t in value)
+        if not 0 < shortest < longest:
+            raise ValueError(f"needs 0 < min < max, got min {shown(value[0])} and max {shown(value[1])}")
+        return (shortest, longest)
+    number = _or_free(value, "time", info)
+    if number <= 0:
+        raise ValueError(f'must be > 0, got {shown(value)}; write "free" to have it optimised')
+    return number
+
+
+class Move(Section):
+    """From where to where, in which time: fixed (s), within a pair [min, max] (s), or free."""
+
+    time: Annotated[float | tuple[float, float] | Literal["free"], BeforeValidator(_move_time)]
+    start: State = State(position=0.0)
+    end: State
+    via: tuple[Via, ...] = ()
+
+    @model_validator(mode="after")
+    def _positions(self) -> Self:
+        if self.end.position is None:
+            raise ValueError('end.position: is missing; write for example "0.25 m", or "free"')
+        return self
+
+    @property
+    def fixed_time(self) -> float | None:
+        """The duration in s, or None when it is part of the answer."""
+        return self.time if isinstance(self.time, float) else None
+
+    @property
+    def start_position(self) -> float | None:
+        """The start position in m or rad (0 by default), or None when free."""
+        position = self.start.position
+        return None if position == FREE else float(position or 0.0)
+
+
+class Limits(Section):
+    """Limits on the signals of the axis; a key left out is no limit. Force is N, or N m (torque) for a rotary axis."""
+
+    position: Annotated[Limit | None, read_limit("position")] = None
+    velocity: Annotated[Limit | None, read_limit("velocity")] = None
+    acceleration: Annotated[Limit | None, read_limit("acceleration")] = None
+    jerk: Annotated[Limit | None, read_limit("jerk")] = None
+    snap: Annotated[Limit | None, read_limit("snap")] = None
+    force: Annotated[Limit | None, read_limit("force")] = None
+    power: Annotated[Limit | None, read_limit("power")] = None
+
+    def given(self) -> dict[str, Limit]:
+        """The limits there are, by name."""
+        return {name: limit for name in type(self).model_fields if (limit := getattr(self, name)) is not None}
+
+
+def _inertia(value: Any, info: ValidationInfo) -> Any:
+    if value is None:
+        return value
+    table = value if isinstance(value, Table) else None
+    if isinstance(value, Mapping):
+        refuse_unknown(value, ("time", "value"))
+        table = read_table(dict(value), "inertia", "value", info)
+    smallest = min(table.value) if table else (number := si(value, "inertia", info))
+    if not smallest > 0:
+        raise ValueError(f"must be > 0, got {shown(value)}")
+    return table or number
+
+
+class Load(Section):
+    """What is moved: force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13 to 15).
+
+    ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, or a Table over time
+    (Remark 1); ``coulomb`` N or N m; ``viscous`` N s/m or N m s.
+    """
+
+    inertia: Annotated[float | Table | None, BeforeValidator(_inertia)] = None
+    coulomb: Annotated[float, nonnegative("force")] = 0.0
+    viscous: Annotated[float, nonnegative("viscous")] = 0.0
+
+
+MINIMIZABLE: Final = ("position", "velocity", "acceleration", "jerk", "snap", "force", "power", "energy", "time")
+WITHOUT_NORM: Final = ("energy", "time")
+
+
+def _norm(value: Any) -> norms.Norm | None:
+    if value is None or isinstance(value, norms.Norm):
+        return value
+    if not isinstance(value, str) or value not in norms.names():
+        raise ValueError(f"unknown norm {shown(value)}; one of {', '.join(norms.names())}")
+    return norms.get(value)
+
+
+def _weight(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise ValueError(f"must be a plain number > 0 such as 0.5, no text and no unit, got {shown(value)}")
+    if not 1 / units.LARGEST <= value <= units.LARGEST:
+        raise ValueError(f"must be > 0 and finite (1e-30 to 1e30), got {shown(value)}; leave a zero term out")
+    return float(value)
+
+
+def _intervals(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"must be a whole number, 4 to {MOST_INTERVALS}, such as 200, got {shown(value)}")
+    if value < 4:
+        raise ValueError(f"must be 4 to {MOST_INTERVALS}, got {shown(value)}; 200 is usual")
+    if value > MOST_INTERVALS:
+        memory = f" (about {15e-6 * value:.2g} GB of memory)" if value < 1e9 else ""
+        raise ValueError(f"must be 4 to {MOST_INTERVALS}, got {shown(value)}{memory}; 200 is usual")
+    return int(value)
+
+
+class Term(Section):
+    """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt (J), or time (s)."""
+
+    minimize: str
+    norm: Annotated[norms.Norm | None, BeforeValidator(_norm), PlainSerializer(lambda n: n and n.name)] = None
+    weight: Annotated[float, BeforeValidator(_weight)] = 1.0
+
+    @model_validator(mode="after")
+    def _norm_fits(self) -> Self:
+        if self.minimize not in MINIMIZABLE:
+            hint = nearest(self.minimize, MINIMIZABLE).partition("; known")[0]
+            raise ValueError(f"minimize: unknown {shown(self.minimize)}; one of {', '.join(MINIMIZABLE)}{hint}")
+        if self.minimize in WITHOUT_NORM and self.norm is not None:
+            raise ValueError(f"norm: {self.minimize} takes no norm; leave it out")
+        if self.minimize not in WITHOUT_NORM and self.norm is None:
+            raise ValueError(f"norm: is missing; {self.minimize} needs one of {', '.join(norms.names())}")
+        return self
+
+    @property
+    def label(self) -> str:
+        """For people: ``jerk l2``, ``energy``."""
+        return self.minimize if self.norm is None else f"{self.minimize} {self.norm.name}"
+
+
+class Objective(Section):
+    """A weighted sum of terms (Clemen & Rupp eq. 26); weights multiply SI values."""
+
+    terms: tuple[Term, ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and any(key in data for key in Term.model_fields):
+            if "terms" in data:
+                raise ValueError("give either minimize, norm and weight, or terms, not both")
+            return {
+                "terms": ({k: v for k, v in data.items() if k in Term.model_fields},),
+                **{k: v for k, v in data.items() if k not in Term.model_fields},
+            }
+        return data
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not self.terms:
+            raise ValueError('terms: is empty; write for example terms = [{ minimize = "jerk", norm = "l2" }]')
+        return self
+
+
+class Transcription(Section):
+    """How the problem is to be discretised and by whom solved; nothing of it changes the move that is meant."""
+
+    intervals: Annotated[int, BeforeValidator(_intervals)] = 200
+    scheme: Literal["exact", "euler"] = "exact"
+    solver: Literal["auto", "clarabel", "osqp", "ipopt"] = "auto"
+
+
+class Problem(Section):
+    """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy."""
+
+    move: Move
+    objective: Objective
+    limits: Limits = Limits()
+    load: Load = Load()
+    transcription: Transcription = Transcription()
+    title: str = ""
+    source: str = ""
+    moral: str = ""
+    rotary: Annotated[bool, Field(strict=True)] = False
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        from trajopt.preflight import refuse_contradictions
+
+        refuse_contradictions(self)
+        return self
+
+    @property
+    def order(self) -> int:
+        """Which derivative is the top one, piecewise constant: 4 (snap) when snap or a boundary jerk is mentioned,
+        3 (jerk) when jerk or a boundary acceleration is, else 2; the Euler scheme always carries jerk (eq. 4)."""
+        mentioned = {*self.limits.given(), *(term.minimize for term in self.objective.terms)}
+        states = (self.move.start, self.move.end, *self.move.via)
+        if "snap" in mentioned or any(state.jerk is not None for state in states):
+            return 4
+        if "jerk" in mentioned or self.transcription.scheme == "euler":
+            return 3
+        return 3 if any(state.acceleration is not None for state in states) else 2
+
+    @property
+    def one_way(self) -> int:
+        """+1 or -1 when the velocity limits allow one direction only, else 0."""
+        velocity = self.limits.velocity
+        if velocity is None:
+            return 0
+        return 1 if velocity.lowest >= 0 else -1 if velocity.highest <= 0 else 0
+
+    def replace(self, **sections: Any) -> Problem:
+        """A copy with sections replaced, validated again."""
+        return Problem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical form: two problems with the same one are the same problem."""
+        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def canonical(self) -> dict[str, Any]:
+        """Plain SI data that says everything about the problem, for result files and hashes."""
+        return self.model_dump(mode="json", exclude_none=True)

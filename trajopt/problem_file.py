@@ -1,0 +1,316 @@
+"""Problem files: TOML with unit texts, read under caps, refused in one line that names the field and the remedy."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+
+from trajopt import problem as p
+from trajopt import units
+from trajopt.errors import BadInput
+from trajopt.fields import nearest
+
+LARGEST_FILE: Final = 1_000_000  # bytes
+_DEEPEST: Final = 64  # nesting, and parts of a dotted key; tomllib takes quadratic time on more
+_LONGEST_WORD: Final = 400  # a number or a bare key
+_MOST_VALUES: Final = 100_000  # a key counts for four: with more, reading and refusing takes over a second
+_TOKEN: Final = re.compile(
+    r'''"""(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?|"(?:[^"\\\n]++|\\.)*+"?'''
+    r"""|'{3}(?:[^']++|'(?!''))*+(?:'{3,5})?|'[^'\n]*+'?|\#[^\n]*+|[\w+-]++|.""",
+    re.DOTALL,
+)
+_EXAMPLES: Final = {  # what to write for what is missing
+    "move": 'write [move] with time = "1 s" and end = { position = "0.25 m" }',
+    "move.time": 'write time = "1 s", or "free"',
+    "move.end": 'write end = { position = "0.25 m" }',
+    "move.via.time": 'write { time = "0.5 s", position = "0.1 m" }',
+    "objective": 'write [objective] with minimize = "jerk" and norm = "l2"',
+    "objective.terms": 'write minimize = "jerk" and norm = "l2", or terms',
+    "objective.terms.minimize": f"write minimize = one of {', '.join(p.MINIMIZABLE)}",
+}
+_LISTS: Final = {
+    "via": '[{ time = "0.5 s", position = "0.1 m" }]',
+    "terms": '[{ minimize = "jerk", norm = "l2" }]',
+}
+_SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"
+_ALIASES: Final = {"load": {"mass": "inertia"}, "limits": {"torque": "force"}}
+
+
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem:
+    """The problem in a TOML file, or of a ready-made problem's name, with ``key=value`` overrides applied.
+
+    Raises BadInput with one line naming the file, the field and the remedy.
+    """
+    source = _find(Path(path))
+    return parse(read_text(source), overrides, name=str(path))
+
+
+def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem:
+    """The problem stated by a TOML text. Raises BadInput."""
+    _refuse_marks(text, name)
+    _refuse_deep(text, name)
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise _refused(name, f"not a TOML file: {_remedied(str(error))}") from None
+    for override in overrides:
+        _override(data, override)
+    return from_dict(data, name)
+
+
+def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem:
+    """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
+    written = data
+    data = {key: _renamed(key, value, name) for key, value in data.items()}
+    rotary = _rotary(data)
+    try:
+        return p.Problem.model_validate({"rotary": rotary, **data}, context={"rotary": rotary, "texts_only": True})
+    except ValidationError as error:
+        raise _refused(name, _as_written(explain(error), written)) from None
+
+
+def read_text(path: Path) -> str:
+    """The text of a regular UTF-8 file of at most 1 MB. Raises BadInput."""
+    name = str(path)
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
+        try:
+            regular = stat.S_ISREG(os.fstat(handle).st_mode)
+            raw = _first_bytes(handle, LARGEST_FILE + 1) if regular else b""
+        finally:
+            os.close(handle)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise _refused(name, f"cannot be read: {reason}; give a problem file or a ready-made problem's name") from None
+    if not regular:
+        raise _refused(name, "not a regular file; give a problem file")
+    if len(raw) > LARGEST_FILE:
+        raise _refused(name, "larger than 1 MB; a problem file takes a few lines")
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")) or b"\0" in raw:
+        raise _refused(name, _SAVE_PLAIN)
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise _refused(name, f"not UTF-8 at byte {error.start}; save it as plain UTF-8") from None
+
+
+def _first_bytes(handle: int, most: int) -> bytes:
+    parts: list[bytes] = []
+    while most > 0 and (part := os.read(handle, most)):
+        parts.append(part)
+        most -= len(part)
+    return b"".join(parts)
+
+
+def _refuse_marks(text: str, name: str) -> None:
+    if text.startswith("\ufeff") or "\0" in text:
+        raise _refused(name, _SAVE_PLAIN)
+
+
+def _find(path: Path) -> Path:
+    if path.suffix == "" and path.name == str(path) and not os.path.exists(path):
+        ready = ready_made()
+        if str(path) not in ready:
+            raise _refused(str(path), f"no such file or ready-made problem{nearest(str(path), list(ready))}")
+        return ready[str(path)]
+    return path
+
+
+def ready_made() -> dict[str, Path]:
+    """The ready-made problems: name -> file, sorted. (Data of the package ``problems``, which is not imported.)"""
+    from importlib.resources import files
+
+    folder = Path(str(files("problems")))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def _refuse_deep(text: str, name: str) -> None:
+    """Refuse, in time linear in ``text``, what tomllib or Python would take long or deep over."""
+    depth = parts = values = 0
+    for token in _TOKEN.finditer(text):
+        first, excess = token[0][0], ""
+        if first in "=,.[]{}\n":
+            values += 1 if first in ",]}" else 0 if first == "\n" else 4
+            depth += (first in "[{") - (first in "]}")
+            parts = parts + 1 if first == "." else 0
+            if depth > _DEEPEST:
+                excess = f"nested deeper than {_DEEPEST}"
+            elif parts >= _DEEPEST:
+                excess = f"a key of more than {_DEEPEST} parts"
+            elif values > _MOST_VALUES:
+                excess = f"more than {_MOST_VALUES} values or a quarter as many keys"
+        elif first not in "\"'#" and len(token[0]) > _LONGEST_WORD:
+            excess = f"a number or key of more than {_LONGEST_WORD} digits or letters"
+        if excess:
+            line = text.count("\n", 0, token.start()) + 1
+            raise _refused(name, f"line {line}: {excess}; a problem file needs nothing of the kind")
+
+
+def _remedied(message: str) -> str:
+    """A message of tomllib with a remedy."""
+    if "overwrite" in message or "twice" in message or "mutate" in message or "redefine" in message:
+        return f"{message}; write each key and section once"
+    return f'{message}; write keys as time = "1 s", texts and quantities in quotes'
+
+
+def _override(data: dict[str, Any], override: str) -> None:
+    """Apply ``move.end.position=0.3 m``: the value is TOML where it reads as TOML, else a text."""
+    key, equals, text = override.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    where = f"--set {key.strip()}"
+    if not equals or not all(parts) or len(parts) > _DEEPEST:
+        raise _refused(f"--set {override}", 'write key=value, for example move.end.position="0.3 m"')
+    _refuse_marks(text, where)
+    _refuse_deep(text, where)
+    try:
+        (value,) = tomllib.loads(f"value = {text}").values()  # more than one: the text smuggles further keys in
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        value = text.strip()
+        if value[:1] in ("[", "{"):
+            raise _refused(where, f'{units.shown(value)} is no TOML list or table; quote it for the shell, such as'
+                           """ 'limits.velocity=["0 m/s", "0.5 m/s"]'""") from None
+    section: Any = data
+    for i, part in enumerate(parts[:-1]):
+        section = section.setdefault(part, {})
+        if not isinstance(section, dict):
+            raise _refused(where, f"{'.'.join(parts[: i + 1])} is not a section; set it as a whole")
+    for other in _replaced(parts, value):
+        section.pop(other, None)
+    section[parts[-1]] = value
+
+
+def _replaced(parts: list[str], value: Any) -> tuple[str, ...]:
+    """The keys beside an overridden one that say the same in other words, and go."""
+    if len(parts) != 2:
+        return ()
+    section, key = parts
+    if section == "objective":
+        without = ("norm",) if key == "minimize" and value in p.WITHOUT_NORM else ()
+        return {"terms": ("minimize", "norm", "weight")}.get(key, ("terms", *without))
+    twins = _ALIASES.get(section, {})
+    return tuple(alias for alias, field in twins.items() if field == key) + ((twins[key],) if key in twins else ())
+
+
+def _renamed(section: str, value: Any, name: str) -> Any:
+    if not isinstance(value, dict) or section not in _ALIASES:
+        return value
+    value = dict(value)
+    for alias, field in _ALIASES[section].items():
+        if alias in value:
+            if field in value:
+                raise _refused(name, f"{section}.{alias}: give {alias} or {field}, not both")
+            value[field] = value.pop(alias)
+    return value
+
+
+def _rotary(data: dict[str, Any]) -> bool:
+    """A rotary axis has an inertia in kg m²; without a load the unit of the end position tells."""
+    if isinstance(data.get("rotary"), bool):
+        return bool(data["rotary"])
+    inertia: Any = data.get("load", {}).get("inertia") if isinstance(data.get("load"), dict) else None
+    if isinstance(inertia, dict):
+        values = inertia.get("value")
+        inertia = values[0] if isinstance(values, list) and values else None
+    move = data.get("move")
+    end = move.get("end") if isinstance(move, dict) else None
+    position = end.get("position") if isinstance(end, dict) else None
+    masses = {axis["inertia"].dimension[:3]: axis is units.ROTARY for axis in (units.LINEAR, units.ROTARY)}
+    known = masses.get(_dimension(inertia)[:3])
+    return known if known is not None else _dimension(position)[3] == 1
+
+
+def _dimension(text: Any) -> units.Dimension:
+    try:
+        return units.parse(text)[1] if isinstance(text, str) else (0, 0, 0, 0, 0)
+    except units.UnitError:
+        return (0, 0, 0, 0, 0)
+
+
+def explain(error: ValidationError) -> str:
+    """The first fault of a validation as one line: the field, what is wrong, what would be right."""
+    faults = error.errors(include_url=False)
+    first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
+    field = _dotted(first["loc"])
+    kind, got = first["type"], units.shown(first["input"])
+    if kind == "extra_forbidden":
+        return f"{field}: unknown key{_meant(first['loc'])}"
+    if kind == "missing":
+        known = ".".join(str(part) for part in first["loc"] if isinstance(part, str))
+        return f"{field}: is missing; {_EXAMPLES.get(known, 'write it')}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{field}: must be a section with keys {', '.join(_keys(first['loc']))}, got {got}"
+    if kind == "tuple_type":
+        return f"{field}: must be a list of sections such as {_LISTS.get(str(first['loc'][-1]), '[...]')}, got {got}"
+    if kind == "literal_error":
+        choices = re.findall(r"'(\w+)'", str(first.get("ctx", {}).get("expected")))
+        near = nearest(str(first["input"]), choices).partition("; known")[0]
+        return f"{field}: unknown {got}; one of {', '.join(choices)}{near}"
+    if kind == "bool_type":
+        return f"{field}: must be true or false, got {got}"
+    if kind.startswith("string"):
+        return f"{field}: must be a text in quotes, got {got}"
+    message = first["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    below = re.match(r"[a-z][\w.\[\]]*: ", message)  # it names a field below the one that pydantic knows
+    return f"{field}{'.' if below else ': '}{message}" if field else message
+
+
+def _meant(loc: Sequence[int | str]) -> str:
+    """A hint at the key meant: one misspelt, or one of another section."""
+    key, known = str(loc[-1]), _keys(loc[:-1])
+    hint = nearest(key, known)
+    homes = [section for section in ("move", "limits", "load", "objective", "transcription") if key in _keys([section])]
+    return f"; it belongs in [{homes[0]}]" if homes and len(loc) <= 2 else hint
+
+
+def _dotted(loc: Sequence[int | str]) -> str:
+    field = ""
+    for part in loc:
+        name = part if isinstance(part, int) or re.fullmatch(r"[\w-]{1,60}", part) else units.shown(part)
+        field += f"[{name}]" if isinstance(part, int) else f".{name}" if field else str(name)
+    return field
+
+
+def _as_written(message: str, data: dict[str, Any]) -> str:
+    """``message`` with the names that the file uses: load.mass, objective.norm."""
+    field, colon, rest = message.partition(": ")
+    objective = data.get("objective")
+    if isinstance(objective, dict) and "terms" not in objective:
+        field = field.replace("objective.terms[0]", "objective")
+    for section, twins in _ALIASES.items():
+        for alias, known in twins.items():
+            if isinstance(data.get(section), dict) and alias in data[section]:
+                field = re.sub(rf"^{section}\.{known}\b", f"{section}.{alias}", field)
+    return field + colon + rest
+
+
+def _keys(loc: Sequence[int | str]) -> list[str]:
+    """The keys known at a place of the problem, with the names that files may use for them."""
+    model: Any = p.Problem
+    for part in loc:
+        if isinstance(part, int):
+            continue
+        annotation = model.model_fields[part].annotation
+        models = [a for a in (annotation, *getattr(annotation, "__args__", ())) if isinstance(a, type)]
+        model = next((m for m in models if issubclass(m, BaseModel)), None)
+        if model is None:
+            return []
+    aliases = _ALIASES.get(str(loc[-1]), {}) if loc else {}
+    extra = ["minimize", "norm", "weight"] if model is p.Objective else []
+    return [*model.model_fields, *aliases, *extra]
+
+
+def _refused(name: str, message: str) -> BadInput:
+    """One printable line of at most 500 characters."""
+    return BadInput(f"{_one_line(name, 110)}: {_one_line(message, 380)}")
+
+
+def _one_line(text: str, most: int) -> str:
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
+    return line if len(line) <= most else f"{line[: most - 3]}..."

@@ -1,0 +1,60 @@
+"""From a solver's vector to a trajectory: re-integrated, so that nothing but the top derivative is taken on trust."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajopt.mesh import Floats, Mesh
+from trajopt.problem import Problem
+from trajopt.scaling import Sizes
+from trajopt.schemes import Scheme
+from trajopt.trajectory import Trajectory
+from trajopt.transcribe import node_limits, prescribed
+
+
+def rebuild(
+    problem: Problem, mesh: Mesh, scheme: Scheme, sizes: Sizes, duration: float, start: Floats, top: Floats
+) -> Trajectory:
+    """The trajectory that starts at ``start`` (m,) and follows ``top`` (N,), corrected to meet every prescribed state.
+
+    Solvers meet equalities to 1e-9 or so. The correction is the smallest that meets them to rounding, spent where
+    the top derivative has room to its limits.
+    """
+    steps = mesh.steps * duration
+    start = start.copy()
+    conditions = []
+    for node, i, value in prescribed(problem, mesh):
+        if node == 0:
+            start[i] = value
+        else:
+            conditions.append((node, i, value))
+    lower, upper = node_limits(problem, problem.order, mesh, duration)
+    top = np.clip(top, lower, upper)
+    for _ in range(2):  # the second pass removes the rounding of the first
+        chain = scheme.rollout(start, top, steps)
+        if conditions:
+            top = top + _correction(chain, conditions, scheme, sizes, steps, np.minimum(upper - top, top - lower))
+    chain = scheme.rollout(start, top, steps)
+    for node, i, value in conditions:
+        if node == mesh.intervals and abs(chain[i][node] - value) <= 1e-11 * sizes.derivative[i]:
+            chain[i][node] = value
+    return Trajectory(problem, mesh, scheme, sizes, duration, problem.move.start_position or 0.0, tuple(chain))
+
+
+def _correction(
+    chain: list[Floats],
+    conditions: list[tuple[int, int, float]],
+    scheme: Scheme,
+    sizes: Sizes,
+    steps: Floats,
+    room: Floats,
+) -> Floats:
+    """(N,) the smallest change of the top derivative, weighted by its room, that meets the conditions."""
+    order = len(chain) - 1
+    scale = sizes.derivative[order]
+    weight = np.square(np.clip(room / scale, 1e-4, 1.0))
+    rows = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
+    miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
+    weighted = rows * weight
+    multiplier = np.linalg.lstsq(weighted @ rows.T, miss, rcond=None)[0]
+    return np.asarray(weighted.T @ multiplier)

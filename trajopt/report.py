@@ -1,0 +1,107 @@
+"""A solution in words and a short table, for people at a terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from trajopt import units
+from trajopt.prices import sentence
+
+if TYPE_CHECKING:
+    from trajopt.solution import Solution
+
+_ROWS = ("velocity", "acceleration", "jerk", "snap", "force", "power")
+
+
+def print_solution(solution: Solution) -> None:
+    """Verdict, objective, duration, peaks and RMS with units, certificate, and who solved it and why."""
+    console = Console(highlight=False, soft_wrap=True)
+    title = solution.problem.title
+    console.print(f"[bold]{solution.status.value}[/]" + (f"  {title}" if title else ""))
+    if not solution.status.solved:
+        for line in solution.explanation.get("text") or [solution.message or solution.status.advice]:
+            console.print(f"  {line}")
+        console.print(f"next: {solution.status.advice}")
+        return
+    assert solution.objective is not None and solution.duration is not None
+    console.print(f"minimised {objective_text(solution)}, in {solution.duration:.9g} s")
+    console.print(_table(solution))
+    console.print(certificate_text(solution))
+    for row in solution.prices[:3]:
+        console.print(f"  {sentence(row, objective_label(solution))}")
+    chosen = solution.route
+    console.print(f"solved by {chosen.solver} through {chosen.model}: {chosen.reason}")
+    if (excess := _between_nodes(solution)) is not None:
+        console.print(excess)
+    if chosen.tie_break:
+        console.print(f"tie broken: {chosen.tie_break}")
+    audit = solution.audit
+    console.print(f"checked independently: {audit.get('checks', 0)} checks passed, tolerance {audit.get('tolerance')}")
+    console.print(", ".join(f"{name} {1000 * t:.0f} ms" for name, t in solution.timings.items()))
+
+
+def objective_text(solution: Solution) -> str:
+    """``power linf = 1.68200675``: what was minimised and its value, with its unit where it is a single signal."""
+    terms = solution.problem.objective.terms
+    text = " + ".join((f"{t.weight:g} × " if len(terms) > 1 else "") + t.label for t in terms)
+    kind = units.kinds(solution.problem.rotary)[terms[0].minimize]
+    pure = len(terms) == 1 and (terms[0].norm is None or terms[0].norm.name in ("l2", "linf"))
+    return f"{text} = {solution.objective:.9g}" + (f" {kind.unit}" if pure else "")
+
+
+def _between_nodes(solution: Solution) -> str | None:
+    """Where a peak was minimised at the nodes and is exceeded between them, by how much."""
+    terms = solution.problem.objective.terms
+    peak = solution.metrics.get(f"peak_{terms[0].minimize}")
+    if len(terms) > 1 or terms[0].norm is None or terms[0].norm.name != "linf" or peak is None:
+        return None
+    assert solution.objective is not None
+    excess = peak / (terms[0].weight * solution.objective) - 1 if solution.objective else 0.0
+    return (
+        f"the peak was minimised at the nodes; between them it is {100 * excess:.2g} % higher"
+        if excess > 1e-6
+        else None
+    )
+
+
+def objective_label(solution: Solution) -> str:
+    """``power linf``, or ``objective`` for a weighted sum."""
+    terms = solution.problem.objective.terms
+    return terms[0].label if len(terms) == 1 else "objective"
+
+
+def certificate_text(solution: Solution) -> str:
+    """What is known about better moves."""
+    certificate = solution.certificate
+    starts = f" ({certificate['agreed']} of {certificate['starts']} starts agree)" if "starts" in certificate else ""
+    if certificate["lower_bound"] is None:
+        return f"{certificate['bounds']}{starts}"
+    bound, gap = certificate["lower_bound"], 100 * certificate["gap"]
+    return f"lower bound {bound:.9g} for {certificate['bounds']}: at most {gap:.2g} % could be gained{starts}"
+
+
+def _table(solution: Solution) -> Table:
+    kinds = units.kinds(solution.problem.rotary)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("")
+    for heading in ("peak", "rms", "limit"):
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
+    given = solution.problem.limits.given()
+    for name in _ROWS:
+        if f"peak_{name}" not in solution.metrics:
+            continue
+        limit = given.get(name)
+        shown = "" if limit is None else "by time" if limit.varies else _limit_text(limit.lowest, limit.highest)
+        values = [f"{solution.metrics[f'{kind}_{name}']:.6g}" for kind in ("peak", "rms")]
+        table.add_row(kinds[name].name, *values, shown, kinds[name].unit)
+    if "energy" in solution.metrics:
+        table.add_row("energy ∫|P|dt", f"{solution.metrics['energy']:.6g}", "", "", "J")
+    return table
+
+
+def _limit_text(lowest: float, highest: float) -> str:
+    return f"±{highest:g}" if lowest == -highest else f"{lowest:g} … {highest:g}"

@@ -1,0 +1,132 @@
+"""Which model and solver a problem goes to, and why; can be asked without solving."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from trajopt.errors import BadInput
+from trajopt.problem import FREE, Problem
+from trajopt.quantities import is_affine
+
+
+@dataclass(frozen=True)
+class Route:
+    """``model``: cvxpy or pyomo; ``solver``: clarabel, osqp or ipopt; ``reason``: one line for people."""
+
+    model: str
+    solver: str
+    reason: str
+    tie_break: str = ""  # what a second solve did where the optimum may not be unique
+    unique: bool = True  # whether the second solve found the profile where the first had it
+
+    def because(self, reason: str) -> Route:
+        """The same route for another reason."""
+        return replace(self, reason=reason)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return dict(vars(self))
+
+
+def route(problem: Problem) -> Route:
+    """The route of a problem: its curvature decides, unless ``transcription.solver`` asks otherwise.
+
+    Raises BadInput, with the reason, when the solver asked for cannot take the problem.
+    """
+    wanted = problem.transcription.solver
+    hindrance = _nonconvex(problem)
+    if wanted == "ipopt":
+        return Route(
+            "pyomo", "ipopt", "asked for" + (f"; {hindrance}" if hindrance else ", though the problem is convex")
+        )
+    if hindrance and has_power_bound(problem) and wanted in ("auto", "clarabel"):
+        return Route("cvxpy", "clarabel", f"{hindrance}; bounded by a cone program, then sequential convex programs")
+    if hindrance:
+        if wanted != "auto":
+            raise BadInput(f'transcription.solver = {wanted!r} takes convex problems only: {hindrance}; use "ipopt"')
+        return Route("pyomo", "ipopt", hindrance)
+    if wanted == "osqp" and (obstacle := _not_quadratic(problem)):
+        raise BadInput(f'transcription.solver = "osqp" takes linear and quadratic programs only: {obstacle}')
+    solver = "clarabel" if wanted == "auto" else wanted
+    return Route("cvxpy", solver, _convex_reason(problem))
+
+
+def nonaffine_limits(problem: Problem) -> list[str]:
+    """The limits that make a convex problem nonconvex; they are tried without first."""
+    return [name for name in problem.limits.given() if not is_affine(problem, name)]
+
+
+def is_time_search(problem: Problem) -> bool:
+    """Whether the problem is minimum time over moves that can wait: a search over fixed-time convex programs.
+
+    Feasibility is monotone in the duration when one end is at rest: the axis can wait there.
+    """
+    only_time = [term.minimize for term in problem.objective.terms] == ["time"]
+    return problem.move.fixed_time is None and only_time and waits_at_an_end(problem)
+
+
+def waits_at_an_end(problem: Problem) -> bool:
+    """Whether the axis may stand still at one end, so that more time never hurts; both positions are given."""
+    move, order = problem.move, problem.order
+    if FREE in (move.start.position, move.end.position):
+        return False
+    can_wait = problem.limits.velocity is None or problem.limits.velocity.lowest <= 0 <= problem.limits.velocity.highest
+    at_rest = [all(state.fixed(order).get(i) == 0.0 for i in range(1, order)) for state in (move.start, move.end)]
+    return can_wait and any(at_rest)
+
+
+def has_power_bound(problem: Problem) -> bool:
+    """Whether `trajopt.power` can bound power and energy globally: exact scheme, jerk on top, fixed time, one way, ends
+    of given velocity and acceleration, equal steps. Elsewhere no global bound is known."""
+    move = problem.move
+    varies = any(limit.varies for limit in problem.limits.given().values()) or not isinstance(
+        problem.load.inertia, float
+    )
+    return (
+        problem.transcription.scheme == "exact"
+        and problem.order == 3
+        and move.fixed_time is not None
+        and problem.one_way != 0
+        and all(state.fixed(3).keys() >= {1, 2} for state in (move.start, move.end))
+        and move.start.position != FREE
+        and not (move.via or varies)
+    )
+
+
+def _nonconvex(problem: Problem) -> str:
+    """Why the problem is not convex, or nothing."""
+    if problem.move.fixed_time is None:
+        if is_time_search(problem):
+            return ""
+        return "the duration is free: step times velocity is a product of unknowns"
+    for term in problem.objective.terms:
+        if not is_affine(problem, term.minimize):
+            return f"{term.label} is nonconvex: " + (
+                "friction changes sign with the velocity"
+                if term.minimize == "force"
+                else "a product of force and velocity"
+            )
+    return ""
+
+
+def _not_quadratic(problem: Problem) -> str:
+    if problem.move.fixed_time is None:
+        return "the search over the time is Clarabel's"
+    norms_used = [term.norm for term in problem.objective.terms if term.norm]
+    if len(norms_used) > 1 and any(norm.name == "l2" for norm in norms_used):
+        return "an l2 norm in a weighted sum is a second-order cone"
+    unknown = [norm.name for norm in norms_used if norm.name not in ("l1", "l2", "linf")]
+    return f"norm {unknown[0]!r} may need a cone" if unknown else ""
+
+
+def _convex_reason(problem: Problem) -> str:
+    extra = nonaffine_limits(problem)
+    condition = f", as long as the {extra[0]} limit stays inactive" if extra else ""
+    if problem.move.fixed_time is None:
+        return f"convex at every fixed time: a search over the time{condition}"
+    norms_used = {term.norm.name for term in problem.objective.terms if term.norm}
+    kind = {frozenset({"l2"}): "quadratic"}.get(
+        frozenset(norms_used), "linear" if norms_used <= {"l1", "linf"} else "cone"
+    )
+    return f"convex: a {kind} program{condition}"

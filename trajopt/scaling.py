@@ -1,0 +1,101 @@
+"""Characteristic sizes: what each signal can reach in this move, so that every solver sees numbers of size one.
+
+Unscaled, solvers call wrong answers optimal: in nanometres an end error of 2000 %, in 1e6 units a feasible move
+infeasible. With these sizes metres, nanometres and kilometres give the same program.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from trajopt.problem import DERIVATIVES, Problem
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """``derivative[i]``: size of the i-th derivative, SI; ``duration`` in s; ``force`` N or N m; ``power`` W."""
+
+    derivative: tuple[float, ...]
+    duration: float
+    force: float
+
+    @property
+    def power(self) -> float:
+        """Size of a power, W."""
+        return self.force * self.derivative[1]
+
+    def of(self, quantity: str) -> float:
+        """Size of a quantity by name, SI."""
+        if quantity in DERIVATIVES:
+            return self.derivative[DERIVATIVES.index(quantity)]
+        return {"force": self.force, "power": self.power, "energy": self.power * self.duration, "time": self.duration}[
+            quantity
+        ]
+
+
+def sizes_of(problem: Problem) -> Sizes:
+    """The sizes of a problem: min(limit, what the stroke needs), but never below a boundary value.
+
+    The stroke needs 4 D/T, 16 D/T², 128 D/T³, 1024 D/T⁴ at most when it is comfortably feasible. A limit also bounds
+    what lies below it, by what can be gained in the duration.
+    """
+    order = problem.order
+    duration = problem.move.fixed_time or _free_duration(problem)
+    stroke = _stroke(problem, duration)
+    derivative = [stroke]
+    for i, factor in enumerate((4.0, 16.0, 128.0, 1024.0)[:order], 1):
+        limit = min(_largest(problem, DERIVATIVES[k]) * duration ** (k - i) for k in range(i, order + 1))
+        reach = min(limit, factor * stroke / duration**i)
+        derivative.append(max(reach, *(abs(x) for x in _given(problem, i)), 1e-9 * min(limit, stroke / duration**i)))
+    inertia = problem.load.inertia
+    mass = 0.0 if inertia is None else inertia if isinstance(inertia, float) else max(inertia.value)
+    load = problem.load
+    force = mass * derivative[2] + load.viscous * derivative[1] + load.coulomb
+    return Sizes(tuple(derivative), duration, force or 1.0)
+
+
+def _given(problem: Problem, i: int) -> list[float]:
+    states = (problem.move.start, problem.move.end, *problem.move.via)
+    values = [getattr(state, DERIVATIVES[i], None) for state in states]
+    return [float(x) for x in values if isinstance(x, float)] or [0.0]
+
+
+def _largest(problem: Problem, name: str) -> float:
+    limit = getattr(problem.limits, name)
+    return math.inf if limit is None else max(abs(limit.lowest), abs(limit.highest))
+
+
+def _stroke(problem: Problem, duration: float) -> float:
+    """How far the axis goes, in m or rad: between given positions, or by the given velocities and accelerations."""
+    positions = _given(problem, 0) + [problem.move.start_position or 0.0]
+    reach = [max(positions) - min(positions)]
+    reach += [abs(v) * duration for v in _given(problem, 1)]
+    reach += [abs(a) * duration**2 / 2 for a in _given(problem, 2)]
+    if any(reach):
+        return max(reach)
+    by_limits = [_largest(problem, DERIVATIVES[i]) * duration**i for i in (1, 2, 3, 4)]
+    finite = [x for x in by_limits if math.isfinite(x)]
+    return min(finite) if finite else 1.0
+
+
+def _free_duration(problem: Problem) -> float:
+    """An estimate of a free duration: the middle of its range, or what the limits allow for the stroke."""
+    if isinstance(problem.move.time, tuple):
+        return math.sqrt(problem.move.time[0] * problem.move.time[1])
+    positions = _given(problem, 0) + [problem.move.start_position or 0.0]
+    stroke = max(positions) - min(positions)
+    if not stroke:
+        velocity = max(abs(x) for x in _given(problem, 1))
+        acceleration = _largest(problem, "acceleration")
+        return 2 * velocity / acceleration if velocity and math.isfinite(acceleration) else 1.0
+    factors = {"velocity": 1.0, "acceleration": 4.0, "jerk": 32.0, "snap": 512.0}
+    times = [
+        (factor * stroke / _largest(problem, name)) ** (1 / i)
+        for i, (name, factor) in enumerate(factors.items(), 1)
+        if math.isfinite(_largest(problem, name))
+    ]
+    if problem.limits.force is not None and problem.load.inertia is not None:
+        mass = problem.load.inertia if isinstance(problem.load.inertia, float) else max(problem.load.inertia.value)
+        times.append(math.sqrt(4 * stroke * mass / _largest(problem, "force")))
+    return max(times, default=1.0)

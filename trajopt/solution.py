@@ -1,0 +1,132 @@
+"""The frozen solution: plain floats, their check, their certificate, and who found them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from trajopt.errors import NoSolution
+from trajopt.files import write_atomically
+from trajopt.problem import Problem
+from trajopt.routing import Route
+from trajopt.trajectory import Trajectory
+from trajopt.verdict import Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FORMAT = "trajopt result 1"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What `trajopt.solve` returns. Without a checked trajectory (``status.solved`` is False) it holds no numbers.
+
+    ``objective`` SI; ``duration`` s; ``metrics`` SI by name; ``certificate``: lower bound, gap and what it bounds;
+    ``audit``: report of the independent check; ``prices``: what each limit costs (see `trajopt.prices`);
+    ``explanation`` of an impossible move (see `trajopt.explain`); ``route``: model, solver, reason; ``timings`` s.
+    """
+
+    status: Verdict
+    problem: Problem
+    route: Route
+    objective: float | None = None
+    duration: float | None = None
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    certificate: Mapping[str, Any] = field(default_factory=dict)
+    audit: Mapping[str, Any] = field(default_factory=dict)
+    explanation: Mapping[str, Any] = field(default_factory=dict)
+    prices: Sequence[Mapping[str, Any]] = ()
+    timings: Mapping[str, float] = field(default_factory=dict)
+    trajectory: Trajectory | None = None
+    message: str = ""
+
+    def _moved(self) -> Trajectory:
+        if self.trajectory is None:
+            raise NoSolution(f"{self.status.value}: {self.message or self.status.advice}")
+        return self.trajectory
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """One row a node: time (s), position, velocity, … (m or rad, and per s), force (N, N m) and power (W).
+
+        The top derivative is the value on the interval that starts at the node; the last row repeats it (exact) or
+        is 0 (euler). ``frame.attrs["units"]`` names the unit of each column. Raises NoSolution.
+        """
+        from trajopt.table import frame
+
+        return frame(self._moved())
+
+    def at(self, t: Any) -> dict[str, Any]:
+        """Position and its derivatives at times ``t`` (s), by the exact interpolant. Raises NoSolution, ValueError."""
+        return self._moved().at(t)
+
+    def plot(self) -> list[Axes]:
+        """Stacked axes of position, velocity, acceleration, jerk and power with their limits. Raises NoSolution."""
+        from trajopt.plot import plot
+
+        self._moved()
+        return plot(self)
+
+    def plot_prices(self) -> Axes:
+        """Bars of what each limit, and the time, costs (see `prices`). Raises NoSolution."""
+        from trajopt.plot import plot_prices
+
+        return plot_prices(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result file's content: plain JSON data, numbers null where there is no solution."""
+        problem = self.problem.canonical()
+        return {
+            "format": FORMAT,
+            "trajopt": _version(),
+            "status": self.status.value,
+            "message": self.message,
+            "objective": self.objective,
+            "duration": self.duration,
+            "metrics": dict(self.metrics) or None,
+            "certificate": dict(self.certificate) or None,
+            "audit": dict(self.audit) or None,
+            "explanation": dict(self.explanation) or None,
+            "prices": [dict(price) for price in self.prices],
+            "route": self.route.to_dict(),
+            "timings": dict(self.timings),
+            "problem_hash": self.problem.hash,
+            "problem": problem,
+            "trajectory": None if self.trajectory is None else self.trajectory.to_dict(),
+        }
+
+    def save(self, directory: str | Path) -> list[Path]:
+        """Write result.json, trajectory.csv, trajectory.png and prices.png into ``directory``; returns the paths.
+
+        Without a solution only result.json is written. Raises OSError.
+        """
+        from trajopt.table import write_csv
+
+        directory = Path(directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        written = [directory / "result.json"]
+        for stale in ("trajectory.csv", "trajectory.png", "prices.png"):  # of another answer
+            (directory / stale).unlink(missing_ok=True)
+        write_atomically(written[0], json.dumps(self.to_dict(), indent=1, allow_nan=False).encode())
+        if self.trajectory is not None:
+            written += [directory / "trajectory.csv", directory / "trajectory.png", directory / "prices.png"]
+            write_csv(self, written[1])
+            for path, axes in zip(written[2:], (self.plot()[0], self.plot_prices()), strict=True):
+                figure: Any = axes.figure
+                figure.savefig(path, dpi=150)
+        return written
+
+    def __repr__(self) -> str:
+        value = "" if self.objective is None else f", objective={self.objective:.9g}, duration={self.duration:.9g}"
+        return f"<Solution {self.status.value}{value}>"
+
+
+def _version() -> str:
+    from trajopt import __version__
+
+    return __version__

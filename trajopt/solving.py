@@ -1,0 +1,190 @@
+"""Solve a problem: route, solve, break ties, price, conclude. Nothing is called solved before the check has passed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+import norms
+from trajopt.attempt import Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
+from trajopt.conclude import conclude, first_solved
+from trajopt.model import Claim, Outcome
+from trajopt.power import descend, linearised, relax
+from trajopt.prices import prices
+from trajopt.problem import Objective, Problem, Term
+from trajopt.quantities import is_affine
+from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route
+from trajopt.solution import Solution
+from trajopt.ties import break_tie, tied_route
+from trajopt.time_search import minimum_time
+from trajopt.trajectory import Trajectory
+from trajopt.transcribe import Setting, prescribed, without
+
+
+def solve(problem: Problem, seconds: float | None = None) -> Solution:
+    """Solve, check and certify; ``seconds`` limits the wall time.
+
+    Returns a Solution in every case; look at ``status``. Raises BadInput when the solver asked for cannot take the
+    problem, MissingSolver when it is not installed, InternalError when a bound exceeds a checked answer.
+    """
+    clock = Clock(seconds)
+    chosen = route(problem)
+    setting = Setting.of(problem)
+    if (still := _coasting(setting)) is not None:
+        solution = conclude(setting, chosen.because("coasting costs nothing: zero is optimal"), still, clock)
+        if solution.status.solved:
+            return solution
+    if chosen.model == "pyomo":
+        return _local(setting, chosen, clock)
+    lean = without(setting, nonaffine_limits(problem))  # an answer that keeps those too is as good as with them
+    if problem.move.fixed_time is None:
+        solution, attempt = _shortest(setting, lean, chosen, clock)
+    elif _is_affine(problem):
+        solution, attempt = _convex(setting, lean, chosen, clock)
+    else:
+        solution, attempt = _by_cones(setting, lean, chosen, clock)
+    if solution.status.solved or lean is setting or attempt.trajectory is None:
+        return solution
+    return _with_all_limits(setting, lean, attempt, clock)
+
+
+def _is_affine(problem: Problem) -> bool:
+    return all(is_affine(problem, term.minimize) for term in problem.objective.terms)
+
+
+def _coasting(setting: Setting) -> Attempt | None:
+    """The top derivative left at zero, where that meets every prescribed state and costs nothing: no norm is less."""
+    problem, duration, sizes = setting.problem, setting.problem.move.fixed_time, setting.sizes
+    states = prescribed(problem, setting.mesh)
+    start = np.zeros(problem.order)
+    places = {value for _, i, value in states if i == 0}
+    start[0] = min(places, default=0.0)  # where a free start may stand still
+    for node, i, value in states:
+        start[i] = value if node == 0 else start[i]
+    if duration is None:
+        return None
+    chain = setting.scheme.rollout(start, np.zeros(setting.mesh.intervals), setting.mesh.steps * duration)
+    if any(abs(chain[i][node] - value) > 1e-12 * sizes.derivative[i] for node, i, value in states):
+        return None
+    still = Trajectory(
+        problem, setting.mesh, setting.scheme, sizes, duration, problem.move.start_position or 0.0, tuple(chain)
+    )
+    if still.measure(problem.objective):
+        return None
+    return Attempt(Outcome(Claim.OPTIMAL, "coasting"), still, value=0.0, bound=0.0)
+
+
+def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
+    """One convex program, and a second one where it leaves a tie."""
+    duration = setting.problem.move.fixed_time
+    assert duration is not None
+    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, chosen.solver), clock)
+    candidates = [break_tie(lean, attempt, chosen, clock), (attempt, chosen)]
+    return first_solved(setting, candidates, clock), attempt
+
+
+def _shortest(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
+    """The least time, and the smoothest move in it if the edge of feasibility leaves room to find it."""
+    attempt = minimum_time(lean, clock)
+    candidates = [(attempt, chosen)]
+    if attempt.trajectory is not None:
+        duration = attempt.trajectory.duration
+        move = lean.problem.move.model_copy(update={"time": duration})
+        at_time = replace(lean, problem=lean.problem.model_copy(update={"move": move}))
+        smooth = convex(at_time, duration, to(smoothest(lean.problem)), clock)
+        if smooth.trajectory is not None:
+            tied = replace(attempt, trajectory=replace(smooth.trajectory, problem=lean.problem))
+            candidates.insert(0, (tied, tied_route(chosen, lean, attempt, tied, "time")))
+    return first_solved(setting, candidates, clock), attempt
+
+
+def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
+    """Power or energy: the bound of the relaxation, and from its answer a descent by convex programs, or by Ipopt."""
+    relaxed = relax(lean, clock)
+    if relaxed.trajectory is None:
+        return conclude(setting, chosen, relaxed, clock), relaxed
+    answer = descend(lean, relaxed.trajectory, clock)
+    candidates = []
+    if answer.trajectory is None:
+        chosen = Route("pyomo", "ipopt", f"{answer.outcome.raw_status}; Ipopt from the relaxation's answer")
+        answer = _priced(lean, nonconvex(lean, to(setting.problem.objective), clock, relaxed.trajectory), clock)
+        answer = replace(answer, bound=relaxed.bound)
+    else:
+        at_answer = linearised(lean, answer.trajectory)
+        answer = replace(_priced(at_answer, answer, clock), bound=relaxed.bound)
+        candidates.append(break_tie(at_answer, answer, chosen, clock))
+    return first_solved(setting, [*candidates, (answer, chosen)], clock, local=True), answer
+
+
+def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: Clock) -> Solution:
+    """Where the answer without the nonconvex limits breaks them: a local optimum with them. Its bound stays valid."""
+    limits = ", ".join(nonaffine_limits(setting.problem))
+    chosen = Route("pyomo", "ipopt", f"the {limits} limit is active, and nonconvex")
+    local = _from_several_starts(setting, lean, clock)
+    bound = max(attempt.bound, relax(setting, clock).bound if has_power_bound(setting.problem) else -np.inf)
+    return conclude(setting, chosen, replace(local, bound=bound), clock, local=True)
+
+
+def _local(setting: Setting, chosen: Route, clock: Clock) -> Solution:
+    """Ipopt from several moves within the limits that are convex; if there is none, the move is impossible."""
+    problem = setting.problem
+    answer = _from_several_starts(setting, without(setting, nonaffine_limits(problem)), clock)
+    bounded = has_power_bound(problem) or (_is_affine(problem) and not nonaffine_limits(problem))
+    if answer.trajectory is not None and bounded and problem.move.fixed_time is not None:
+        answer = replace(answer, bound=relax(setting, clock).bound)
+    return conclude(setting, chosen, answer, clock, local=True)
+
+
+def _from_several_starts(setting: Setting, lean: Setting, clock: Clock) -> Attempt:
+    """The best of the local optima that Ipopt finds, with a note on how many starts there were and how many agreed."""
+    goal = to(setting.problem.objective)
+    found: list[Attempt] = []
+    failed: list[Attempt] = []
+    for start in _starts(setting, lean, clock):
+        if start.trajectory is None:
+            failed.append(start)
+            break
+        attempt = nonconvex(setting, goal, clock, start.trajectory)
+        (failed if attempt.trajectory is None else found).append(attempt)
+        if clock.over:
+            break
+    if not found:
+        return failed[0]
+    best = min(found, key=lambda attempt: attempt.value)
+    agreed = sum(a.value <= best.value + 1e-6 * abs(best.value) for a in found)
+    return _priced(setting, replace(best, notes={"starts": len(found) + len(failed), "agreed": agreed}), clock)
+
+
+def _starts(setting: Setting, lean: Setting, clock: Clock) -> Iterator[Attempt]:
+    """Moves to start from: the smoothest, the slowest and the gentlest within the convex limits; where the duration is
+    free, the smoothest without limits at several durations."""
+    problem, duration = setting.problem, setting.problem.move.fixed_time
+    if duration is None:
+        for factor in (1.0, 1.6):
+            still = unlimited(setting, factor * _first_duration(setting))
+            yield Attempt(Outcome(Claim.OPTIMAL, "unlimited"), still)
+        return
+    peaks = (Objective(terms=(Term(minimize=x, norm=norms.Linf()),)) for x in ("velocity", "acceleration"))
+    for objective in (smoothest(problem), *peaks):
+        yield convex(lean, duration, to(objective), clock)
+
+
+def _first_duration(setting: Setting) -> float:
+    """A duration to start from, in s: the middle of the range, or somewhat more than the limits allow at least."""
+    if isinstance(setting.problem.move.time, tuple):
+        return setting.sizes.duration
+    return (1.2 if is_time_search(setting.problem) else 1.5) * setting.sizes.duration
+
+
+def _priced(setting: Setting, attempt: Attempt, clock: Clock) -> Attempt:
+    """The attempt with the prices of the limits of its problem."""
+    if attempt.trajectory is None:
+        return attempt
+    since = perf_counter()
+    goal = to(setting.problem.objective)
+    found = prices(setting, attempt, goal, attempt.trajectory.duration, attempt.value)
+    clock.charge("prices", since)
+    return replace(attempt, notes=attempt.notes | {"prices": found})

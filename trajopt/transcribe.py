@@ -1,0 +1,206 @@
+"""The one constraint builder: a problem, laid on a mesh by a scheme, becomes rows and an objective on any model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trajopt.fields import Limit
+from trajopt.mesh import Floats, Mesh, mesh_for
+from trajopt.model import own_size
+from trajopt.preflight import at_time
+from trajopt.problem import DERIVATIVES, Problem
+from trajopt.quantities import Quantities
+from trajopt.scaling import Sizes, sizes_of
+from trajopt.schemes import SCHEMES, Scheme
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Setting:
+    """All that a transcription needs beside the model: the problem, its mesh, scheme and sizes."""
+
+    problem: Problem
+    mesh: Mesh
+    scheme: Scheme
+    sizes: Sizes
+    quantities: Callable[..., Quantities] = Quantities  # makes force and power from the chain; a relaxation has its own
+
+    @classmethod
+    def of(cls, problem: Problem) -> Setting:
+        """The setting of a problem, from its transcription section."""
+        return cls(problem, mesh_for(problem), SCHEMES[problem.transcription.scheme], sizes_of(problem))
+
+
+def without(setting: Setting, names: Sequence[str]) -> Setting:
+    """The setting without some limits."""
+    if not names:
+        return setting
+    limits = setting.problem.limits.model_copy(update=dict.fromkeys(names))
+    return replace(setting, problem=setting.problem.model_copy(update={"limits": limits}))
+
+
+@dataclass(frozen=True)
+class Transcript:
+    """A transcribed problem: the expressions from which the floats of the answer are read."""
+
+    problem: Problem
+    mesh: Mesh
+    scheme: Scheme
+    sizes: Sizes
+    model: Any
+    chain: list[Any]
+    duration: Any  # s: a float, or an expression when it is free
+    quantities: Quantities
+    widen: Mapping[str, Any] = field(default_factory=dict)
+
+
+def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, Any] = _NOTHING) -> Transcript:
+    """Kinematics, boundary and via states, and limits of a problem on ``model``; the objective comes separately.
+
+    ``duration`` (s) is a float, or an expression of a nonconvex model. ``widen`` maps sides of limits, such as
+    ``velocity.max``, to scalar expressions: the side is moved outwards by so many times its own value (see
+    `trajopt.model.own_size`).
+    """
+    problem, mesh, scheme, sizes = setting.problem, setting.mesh, setting.scheme, setting.sizes
+    steps = model.times(mesh.steps, duration)
+    chain = _variables(problem, mesh, sizes, model, duration, widen)
+    for i in range(problem.order):
+        model.zero(chain[i][1:] - scheme.advance(model, chain, i, steps), sizes.derivative[i])
+    for node, i, value in prescribed(problem, mesh):
+        model.zero(chain[i][node] - value, sizes.derivative[i])
+    known = setting.quantities(problem, model, scheme, mesh, sizes, chain, steps)
+    transcript = Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen)
+    for name, limit in problem.limits.given().items():
+        _limit(transcript, name, limit)
+    return transcript
+
+
+def prescribed(problem: Problem, mesh: Mesh) -> list[tuple[int, int, float]]:
+    """(node, derivative, value) of every boundary and via condition; positions as displacement from the start, or
+    absolute where the start is free."""
+    move, order = problem.move, problem.order
+    origin = move.start_position or 0.0
+    states: list[tuple[int, Any, float | None]] = [(0, move.start, 0.0), (mesh.intervals, move.end, 0.0)]
+    for via in move.via:
+        states.append((mesh.node_at(via.time / (move.fixed_time or 1.0)), via, None))
+    conditions = []
+    for node, state, default in states:
+        for i, value in state.fixed(order, default).items():
+            shift = (origin if state.position is not None else 0.0) if i == 0 else 0.0
+            limit = getattr(problem.limits, DERIVATIVES[i])
+            if limit is not None:  # by a rounding outside: farther ones have been refused
+                low, high = at_time(limit, mesh.fractions[node] * (move.fixed_time or 0.0))
+                value = min(max(value, low), high)
+            conditions.append((node, i, value - shift))
+    if not any(i == 0 for _, i, _ in conditions) and problem.limits.position is None:
+        conditions.append((0, 0, 0.0))  # the move may be anywhere: let it start at zero
+    return conditions
+
+
+def _variables(
+    problem: Problem, mesh: Mesh, sizes: Sizes, model: Any, duration: Any, widen: Mapping[str, Any]
+) -> list[Any]:
+    """The chain: (N+1,) node values of each derivative below the order, (N,) interval values at the order.
+
+    Node limits are bounds of the variables, except where a boundary state is prescribed (there an equality says it)
+    and where they are to be widened.
+    """
+    chain = []
+    for i in range(problem.order + 1):
+        name = DERIVATIVES[i]
+        lower, upper = node_limits(problem, i, mesh, duration)
+        if f"{name}.min" in widen:
+            lower = np.full(len(lower), -np.inf)
+        if f"{name}.max" in widen:
+            upper = np.full(len(upper), np.inf)
+        places = mesh.places(top=i == problem.order)
+        chain.append(model.vector(len(lower), sizes.derivative[i], lower, upper, name, places))
+    return chain
+
+
+def node_limits(problem: Problem, i: int, mesh: Mesh, duration: Any) -> tuple[Floats, Floats]:
+    """Lower and upper limit of the i-th derivative at the nodes, or of the top one over whole intervals; infinite where
+    there is none or where a state is prescribed."""
+    top = i == problem.order
+    limit = getattr(problem.limits, DERIVATIVES[i])
+    count = mesh.intervals + (not top)
+    if limit is None:
+        return np.full(count, -np.inf), np.full(count, np.inf)
+    lower, upper = sides(problem, i, limit, duration, mesh.fractions)
+    if top:
+        return np.maximum(lower[:-1], lower[1:]), np.minimum(upper[:-1], upper[1:])
+    for node in (node for node, j, _ in prescribed(problem, mesh) if j == i):
+        lower[node], upper[node] = -np.inf, np.inf
+    return lower, upper
+
+
+def sides(problem: Problem, i: int, limit: Limit, duration: Any, fractions: Floats) -> tuple[Floats, Floats]:
+    """A limit at fractions of the duration; that of position (i = 0) as displacement from the start."""
+    times = fractions * (duration if isinstance(duration, float) else 1.0)
+    lower, upper = limit.at(times)
+    origin = (problem.move.start_position or 0.0) if i == 0 else 0.0
+    infinite = np.full(len(fractions), np.inf)
+    return (-infinite if lower is None else lower - origin), (infinite if upper is None else upper - origin)
+
+
+def _limit(transcript: Transcript, name: str, limit: Limit) -> None:
+    """Rows that hold a limit between nodes (and, for what is no variable or is widened, at them)."""
+    problem, mesh, duration = transcript.problem, transcript.mesh, transcript.duration
+    signal = transcript.quantities.signal(name)
+    i = DERIVATIVES.index(name) if name in DERIVATIVES else -1
+    if i >= 0:
+        at_nodes, places = node_limits(problem, i, mesh, duration), mesh.places(top=i == problem.order)
+        _rows(transcript, name, transcript.chain[i], at_nodes, places, only=transcript.widen)
+    elif signal.nodes is not None:
+        _rows(transcript, name, signal.nodes, sides(problem, i, limit, duration, mesh.fractions), mesh.fractions)
+    if i == problem.order:
+        return  # the top derivative is constant on intervals: nothing is left to hold
+    for b in range(1, signal.degree) if signal.nodes is not None else range(signal.degree + 1):
+        left, right = mesh.fractions[:-1], mesh.fractions[1:]
+        where = left + (right - left) * (b / signal.degree if signal.degree else 0.5)
+        lower, upper = sides(problem, i, limit, duration, where)
+        if i >= 0:
+            _skip_prescribed(problem, mesh, i, b, signal.degree, lower, upper)
+        _rows(transcript, name, signal.pieces[b], (lower, upper), where)
+
+
+def _skip_prescribed(problem: Problem, mesh: Mesh, i: int, b: int, degree: int, lower: Floats, upper: Floats) -> None:
+    """Drop the limit on a coefficient that boundary states at rest fix already: a row without interior stalls solvers.
+
+    The b-th coefficient is fixed by derivatives i..i+b at the left node, or i..i+degree-b at the right one.
+    """
+    values = {(node, j): value for node, j, value in prescribed(problem, mesh)}
+    for node, k, reach in ((0, 0, b), (mesh.intervals, -1, degree - b)):
+        states = [values.get((node, j)) for j in range(i, i + reach + 1)]
+        at_rest = all(x is not None for x in states) and not any(states[1:])
+        if at_rest and lower[k] <= states[0] <= upper[k]:
+            lower[k], upper[k] = -np.inf, np.inf
+
+
+def _rows(
+    transcript: Transcript,
+    name: str,
+    values: Any,
+    limits: tuple[Floats, Floats],
+    at: Floats,
+    only: Container[str] | None = None,
+) -> None:
+    """``values`` within ``limits`` at fractions ``at`` of the duration; with ``only``, the sides named there alone."""
+    model, size = transcript.model, transcript.sizes.of(name)
+    for side, bound, sign in (("min", limits[0], -1.0), ("max", limits[1], 1.0)):
+        key = f"{name}.{side}"
+        active = np.flatnonzero(np.isfinite(bound))
+        if not len(active) or (only is not None and key not in only):
+            continue
+        some = values if len(active) == len(bound) else values[active]
+        residual = sign * (some - bound[active])
+        if key in transcript.widen:
+            residual = residual - transcript.widen[key] * own_size(bound[active], size)
+        row_size = max(size, float(np.max(np.abs(bound[active]))))
+        model.nonpositive(residual, row_size, key, at[active], own_size(bound[active], size))
