@@ -1,0 +1,113 @@
+"""The checks of one result, put together."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trajopt.checker.case import certificate_checks, time_checks
+from trajopt.checker.float_twin import FloatTwin
+from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
+from trajopt.checker.reading import Malformed, read
+from trajopt.checker.report import Check, Report, question
+from trajopt.checker.result_file import CheckerInputError, read_json, table_fault
+
+
+def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *, strict: bool = False) -> Report:
+    """Check one result; with ``problem`` (its canonical data) also that the result answers that problem.
+
+    Never raises on the content of ``result``: whatever is wrong with it is a failed check.
+    """
+    notes: list[str] = []
+    checks = _identity(result, problem)
+    try:
+        case = read(result, notes)
+    except Malformed as fault:
+        return _report([*checks, question("structure", str(fault))], False, strict, notes)
+    checks.append(question("structure"))
+    if case is None:
+        return _report(checks, strict, strict, notes)
+    checks += [*time_checks(case), *certificate_checks(case, notes)]
+    decided, rational = decide(case, strict, notes)
+    return _report(checks + decided, rational, strict, notes)
+
+
+def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None = None, strict: bool = False) -> Report:
+    """Check the result file at ``path``, and a trajectory.csv beside a result.json, which must say the same.
+
+    Raises CheckerInputError when the file cannot be read as JSON data at all.
+    """
+    result = read_json(Path(path))
+    report = check(result, problem, strict=strict)
+    table = Path(path).with_name("trajectory.csv")
+    if Path(path).name != "result.json" or not os.path.lexists(table):
+        return report
+    notes: list[str] = []
+    try:
+        case = read(result, notes)
+        fault = table_fault(table, case, notes)
+    except Malformed as malformed:
+        fault = f"cannot be compared, {malformed}"
+    checks = (*report.checks, question("trajectory.csv", fault))
+    return replace(report, checks=checks, not_checked=tuple(dict.fromkeys((*report.not_checked, *notes))))
+
+
+def measure(result: Mapping[str, Any]) -> dict[str, float]:
+    """The metrics of a result's trajectory (SI), recomputed in floats; what is claimed of it is not looked at.
+
+    Raises CheckerInputError when there is no trajectory, or none that can be read.
+    """
+    try:
+        case = read({**result, "objective": 0.0, "metrics": {}, "certificate": None}, [])
+    except Malformed as fault:
+        raise CheckerInputError(f"nothing to measure: {fault}") from None
+    if case is None:
+        raise CheckerInputError(f"nothing to measure: {result.get('status')} carries no trajectory")
+    with np.errstate(all="ignore"):
+        twin = FloatTwin(case)
+        return {name: float(twin.metric(name)[0]) for name in metric_names(case)}
+
+
+def _report(checks: list[Check], rational: bool, strict: bool, notes: list[str]) -> Report:
+    return Report(tuple(checks), "rational" if rational else "float", STRICT if strict else USUAL, tuple(notes))
+
+
+def _identity(result: Mapping[str, Any], problem: Mapping[str, Any] | None) -> list[Check]:
+    """Whether the result carries the problem it was made for, and the one it is asked about."""
+    own = result.get("problem") if isinstance(result, Mapping) else None
+    fault = ""
+    if not isinstance(own, Mapping) or result.get("problem_hash") != (_hash(own) or "none"):
+        fault = "problem_hash does not fit: the file was edited, or its numbers belong to another problem"
+    checks = [question("problem hash", fault)]
+    if problem is not None:
+        checks.append(question("same problem", "" if _same(problem, own) else "the result belongs to another problem"))
+    return checks
+
+
+def _same(problem: Mapping[str, Any], own: Any) -> bool:
+    try:
+        return bool(_plain(problem) == _plain(own))
+    except RecursionError:
+        return False
+
+
+def _hash(problem: Mapping[str, Any]) -> str | None:
+    try:
+        text = json.dumps(problem, sort_keys=True, separators=(",", ":"))
+    except (TypeError, ValueError, RecursionError):
+        return None
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, so that data from code and from a file compare equal."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,351 @@
+"""The float twin: all sums in floats, on whole arrays."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.checker.case import DERIVATIVES, EPS, LOADED, SPLITS, Array, Case, Curve
+from trajopt.checker.polynomials import absolute_integral, bernstein, highest, mean_square, product
+from trajopt.checker.report import Found, Number, to_float
+
+
+class _Pieces(NamedTuple):
+    """Stretches of one polynomial each: interval, start (s after its left node), length (s). Any order."""
+
+    interval: NDArray[np.intp]
+    offset: Array
+    length: Array
+
+    def take(self, which: NDArray[np.bool_]) -> _Pieces:
+        return _Pieces(self.interval[which], self.offset[which], self.length[which])
+
+    def joined(self, other: _Pieces) -> _Pieces:
+        return _Pieces(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+    def halved(self) -> _Pieces:
+        half = self.length / 2
+        return _Pieces(self.interval, self.offset, half).joined(_Pieces(self.interval, self.offset + half, half))
+
+
+class _Instants(NamedTuple):
+    """Where a quantity is sampled: nodes (or intervals, for the top derivative) and the weight of each sample."""
+
+    node: NDArray[np.intp]
+    interval: NDArray[np.intp]
+    weight: Array
+
+
+class FloatTwin:
+    """All sums in floats, on whole arrays."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.euler = case.scheme == "euler"
+        self.step = np.full(case.count, case.end_time / case.count) if self.euler else np.diff(case.time)
+        top = case.signal[-1]
+        self.left = (*case.signal[:-1], np.append(top, top[-1]))
+
+    # dynamics
+
+    @cached_property
+    def defects(self) -> list[tuple[Array, float]]:
+        """By derivative: re-integrated minus given increment of each interval, and its rounding error."""
+        found = []
+        for i in range(self.case.order):
+            reach = 1 if self.euler else self.case.order - i
+            terms = [self.step**j / math.factorial(j) * self.left[i + j][:-1] for j in range(1, reach + 1)]
+            given = np.diff(self.left[i])  # first, so that a far-off origin costs no digits
+            sizes = [float(np.max(np.abs(term))) for term in (*terms, given)]
+            found.append((np.sum(terms, axis=0) - given, 8 * EPS * sum(sizes)))
+        return found
+
+    @cached_property
+    def drifts(self) -> list[Array]:
+        """By derivative: the whole move re-integrated from its start, minus the given nodes.
+
+        The difference itself is integrated, from the defects: it is small, and so is its rounding.
+        """
+        order = self.case.order
+        found = [np.zeros(self.case.count + 1) for _ in range(order + 1)]
+        for i in reversed(range(order)):
+            reach = 1 if self.euler else order - i
+            terms = [self.step**j / math.factorial(j) * found[i + j][:-1] for j in range(1, reach + 1)]
+            found[i][1:] = np.cumsum(np.sum(terms, axis=0) + self.defects[i][0])
+        return found
+
+    def defect(self, i: int) -> Found:
+        values, rounding = self.defects[i]
+        k = int(np.argmax(np.abs(values)))
+        return Found(float(abs(values[k])), float(self.case.time[k + 1]), rounding)
+
+    def drift(self, i: int) -> Found:
+        k = int(np.argmax(np.abs(self.drifts[i])))
+        span, count = self.case.end_time, self.case.count
+        reach = range(self.case.order - i)
+        rounding = sum(count * self.defects[i + j][1] * span**j / math.factorial(j) for j in reach)
+        return Found(float(abs(self.drifts[i][k])), float(self.case.time[k]), rounding)
+
+    def state(self, i: int, node: int, target: float) -> Found:
+        return Found(abs(float(self.case.signal[i][node]) - target), float(self.case.time[node]))
+
+    # between the nodes: polynomials in s, 0 <= s <= 1, a row of coefficients per piece
+
+    @cached_property
+    def pieces(self) -> _Pieces:
+        """The intervals, split at the corners of tables, and one of no length for the last node."""
+        time = self.case.time
+        left = np.union1d(time, self.case.corners) if self.case.corners else time
+        interval = np.searchsorted(time, left, side="right") - 1
+        return _Pieces(interval, left - time[interval], np.append(np.diff(left), 0.0))
+
+    @cached_property
+    def one_way(self) -> _Pieces:
+        """The pieces, split where friction changes its direction."""
+        mixed, done = self.pieces, []
+        for _ in range(SPLITS if self.case.coulomb else 0):
+            velocity = bernstein(self.rows(1, mixed))
+            whole = np.all(velocity >= -self.case.rest, axis=1) | np.all(velocity <= self.case.rest, axis=1)
+            done.append(mixed.take(whole))
+            if np.all(whole):
+                break
+            mixed = mixed.take(~whole).halved()
+        else:
+            done.append(mixed)
+        return _Pieces(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+
+    def pieces_of(self, name: str) -> _Pieces:
+        return self.one_way if name in LOADED else self.pieces
+
+    def rows(self, i: int, pieces: _Pieces) -> Array:
+        """Coefficients (pieces, order - i + 1) of the i-th derivative."""
+        order, k = self.case.order, pieces.interval
+        states = [values[k] for values in self.left[i:]]
+        if np.any(pieces.offset):
+            states = [
+                np.sum([pieces.offset**n / math.factorial(n) * states[j + n] for n in range(order - i - j + 1)], axis=0)
+                for j in range(order - i + 1)
+            ]
+        found = np.empty((len(k), len(states)))
+        for j, values in enumerate(states):
+            found[:, j] = pieces.length**j * values / math.factorial(j)
+        return found
+
+    def line(self, curve: Curve, pieces: _Pieces) -> tuple[Array, Array]:
+        """A table at both ends of each piece."""
+        start = self.case.time[pieces.interval] + pieces.offset
+        return curve.at(start), curve.at(start + pieces.length)
+
+    @cached_property
+    def drawn(self) -> dict[tuple[str, float], tuple[Array, Array]]:
+        return {}
+
+    def polynomial(self, name: str, at_rest: float = 0.0) -> tuple[Array, Array]:
+        """Any quantity on its pieces, as coefficients of powers and of Bernstein polynomials.
+
+        ``at_rest`` is the friction where the axis stands still.
+        """
+        if (name, at_rest) not in self.drawn:
+            loaded = name in LOADED
+            rows = self.loaded_rows(name, at_rest) if loaded else self.rows(DERIVATIVES.index(name), self.pieces)
+            self.drawn[name, at_rest] = rows, bernstein(rows)
+        return self.drawn[name, at_rest]
+
+    def loaded_rows(self, name: str, at_rest: float) -> Array:
+        """Coefficients of force or power on the pieces of one direction."""
+        assert self.case.inertia is not None
+        velocity = self.rows(1, self.one_way)
+        if name == "power":
+            return product(self.polynomial("force", at_rest)[0], velocity)
+        inertia, acceleration = self.case.inertia, self.rows(2, self.one_way)
+        force = self.case.viscous * velocity  # of one degree more than acceleration, enough for a linear inertia
+        if len(inertia.value) == 1:
+            force[:, :-1] += inertia.value[0] * acceleration
+        else:
+            left, right = self.line(inertia, self.one_way)
+            force += product(np.stack([left, right - left], axis=1), acceleration)
+        force[:, 0] += self.friction(velocity, at_rest) if self.case.coulomb else 0.0
+        return force
+
+    def friction(self, velocity: Array, at_rest: float) -> Array:
+        """Coulomb friction on each piece, from the coefficients of its velocity."""
+        values = bernstein(velocity)
+        forward, backward = np.max(values, axis=1) > self.case.rest, np.min(values, axis=1) < -self.case.rest
+        return np.where(forward, self.case.coulomb, np.where(backward, -self.case.coulomb, at_rest))
+
+    # at the nodes
+
+    def instants(self, name: str) -> _Instants:
+        """The samples of a quantity and what each stands for (s; 1 in the plain sums of the Euler scheme)."""
+        count, interval = self.case.count, np.arange(self.case.count)
+        if not self.case.depends_on_top(name):
+            weight = np.zeros(count + 1)
+            weight[:-1] += self.step / 2
+            weight[1:] += self.step / 2
+            found = _Instants(np.arange(count + 1), np.minimum(np.arange(count + 1), count - 1), weight)
+        elif name in LOADED:
+            both = np.concatenate([interval, interval])
+            found = _Instants(np.concatenate([interval, interval + 1]), both, np.tile(self.step / 2, 2))
+        else:
+            found = _Instants(interval, interval, self.step)
+        return found._replace(weight=np.ones_like(found.weight)) if self.euler else found
+
+    def sampled(self, i: int, instants: _Instants) -> Array:
+        return self.case.signal[i][instants.interval if i == self.case.order else instants.node]
+
+    def samples(self, name: str, convention: int = 0) -> tuple[Array, Array]:
+        """Values and weights; for ``convention`` see `Case.conventions`."""
+        instants = self.instants(name)
+        if name not in LOADED:
+            return self.sampled(DERIVATIVES.index(name), instants), instants.weight
+        velocity = self.sampled(1, instants)
+        friction = self.case.coulomb * _friction_signs(velocity, self.case.rest)[convention]
+        return self.loaded(name, instants, velocity, friction), instants.weight
+
+    def loaded(self, name: str, instants: _Instants, velocity: Array, friction: Array) -> Array:
+        assert self.case.inertia is not None
+        inertia = self.case.inertia.at(self.case.time[instants.node])
+        force = inertia * self.sampled(2, instants) + self.case.viscous * velocity + friction
+        return force if name == "force" else force * velocity
+
+    def peak(self, name: str) -> float:
+        """How large a quantity gets, never too small; of a position the largest excursion."""
+        origin = self.case.signal[0][0] if name == "position" else 0.0
+        values = self.samples(name)[0] if self.euler else self.polynomial(name)[1]
+        return float(np.max(np.abs(values - origin)))
+
+    @cached_property
+    def magnitudes(self) -> tuple[float, ...]:
+        """By derivative: the sum of what its polynomials are summed from, for bounds on rounding."""
+        peaks = [float(np.max(np.abs(values))) for values in self.case.signal]
+        longest = 0.0 if self.euler else float(np.max(self.step))
+        return tuple(
+            sum(longest**j / math.factorial(j) * peak for j, peak in enumerate(peaks[i:])) for i in range(len(peaks))
+        )
+
+    def noise(self, name: str) -> float:
+        """A generous bound on the rounding of any one value of a quantity."""
+        if name not in LOADED:
+            return 64 * EPS * self.magnitudes[DERIVATIVES.index(name)]
+        assert self.case.inertia is not None
+        inertia = max(abs(value) for value in self.case.inertia.value)
+        force = inertia * self.magnitudes[2] + self.case.viscous * self.magnitudes[1] + self.case.coulomb
+        return 64 * EPS * force * (1.0 if name == "force" else self.magnitudes[1])
+
+    # answers
+
+    def excess(self, name: str, tolerance: float) -> Found:
+        """How far a limit is exceeded; where the axis rests, friction may take whatever value keeps the limit."""
+        found = [Found(0.0)]
+        for side, limit, label in zip((-1, 1), self.case.limits[name], ("min", "max"), strict=True):
+            if limit is not None:
+                ask = self.excess_at_nodes if self.euler else self.excess_between
+                found.append(ask(name, side, limit, tolerance)._replace(note=label))
+        worst = max(found, key=lambda one: (math.isnan(one.violation), one.violation))
+        return worst._replace(rounding=self.noise(name))
+
+    def excess_at_nodes(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
+        instants = self.instants(name)
+        values = self.samples(name)[0]
+        if name == "force":
+            velocity = self.sampled(1, instants)
+            sign = np.where(np.abs(velocity) <= self.case.rest, -side, np.sign(velocity))
+            values = self.loaded(name, instants, velocity, self.case.coulomb * sign)
+        time = self.case.time[instants.node]
+        over = side * (values - limit.at(time))
+        k = int(np.argmax(over))
+        return Found(float(over[k]), float(time[k])) if over[k] > 0 else Found(0.0)
+
+    def excess_between(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
+        rows = self.polynomial(name, -side * self.case.coulomb if name in LOADED else 0.0)[1]
+        over = side * (rows - self.limit_rows(limit, self.pieces_of(name), rows.shape[1] - 1))
+        slack = tolerance * 1e-3
+        if np.max(over) <= slack:
+            return Found(0.0)
+        value, piece, s = highest(over, slack, 0.0)
+        interval, offset, length = (values[piece] for values in self.pieces_of(name))
+        return Found(value, float(self.case.time[interval] + offset + s * length))
+
+    def limit_rows(self, limit: Curve, pieces: _Pieces, degree: int) -> Array:
+        """A limit in Bernstein form, of degree one at least where it varies."""
+        if len(limit.value) == 1:
+            return np.full((1, 1), limit.value[0])
+        left, right = self.line(limit, pieces)
+        return left[:, None] + (right - left)[:, None] * np.linspace(0.0, 1.0, max(degree, 1) + 1)
+
+    def objective(self) -> list[Number]:
+        """The objective for each convention of friction at rest, and its rounding."""
+        terms = self.case.terms
+        conventions = self.case.conventions(*(name for name, _, _ in terms))
+        totals = [sum(weight * self.term(name, norm, c)[0] for name, norm, weight in terms) for c in conventions]
+        rounding = sum(weight * self.term(name, norm, 0)[1] for name, norm, weight in terms)
+        return [*totals, rounding + 1e-12 * abs(totals[0])]
+
+    def term(self, name: str, norm: str | None, convention: int) -> tuple[float, float]:
+        """The value and rounding of one term without its weight; a norm we do not know counts as nothing."""
+        if name == "time":
+            return self.case.duration, 0.0
+        quantity = "power" if name == "energy" else name
+        values, weights = self.samples(quantity, convention)
+        if name == "energy":
+            norm, weights = "l1", np.full_like(weights, self.step[0]) if self.euler else weights
+        elif name == "position":
+            values = values - values[0]
+        duration = 1.0 if self.euler else self.case.end_time
+        noise = np.full_like(values, self.noise(quantity))
+        return _norm(norm, values, weights, duration), _norm(norm, noise, weights, duration)
+
+    def metric(self, name: str) -> list[Number]:
+        """A metric for each convention of friction at rest, and its rounding."""
+        kind, _, quantity = name.partition("_")
+        quantity = quantity or {"energy": "power", "distance": "velocity"}[kind]
+        found = self.metric_at_nodes(kind, quantity) if self.euler else self.metric_between(kind, quantity)
+        span = self.case.end_time if kind in ("energy", "distance") else 1.0
+        return [*found, self.noise(quantity) * span + 1e-12 * to_float(found[0])]
+
+    def metric_at_nodes(self, kind: str, quantity: str) -> list[Number]:
+        found: list[Number] = []
+        weights = np.full(self.case.count + 1, self.step[0])
+        weights[[0, -1]] *= (1.0, 0.0) if kind == "distance" else 0.5  # a path as the scheme integrates it, eq. (4)
+        if self.case.depends_on_top(quantity):
+            weights = self.step
+        for convention in self.case.conventions(quantity):
+            values = self.samples(quantity, convention)[0]
+            norm = {"peak": "linf", "rms": "l2"}.get(kind, "l1")
+            found.append(_norm(norm, values, weights, self.case.end_time))
+        return found
+
+    def metric_between(self, kind: str, quantity: str) -> list[Number]:
+        coulomb = self.case.coulomb if quantity == "force" else 0.0
+        resting = (0.0, coulomb, -coulomb) if coulomb else (0.0,)
+        if kind == "peak":  # friction at rest first as it makes the least of the peak
+            found = [self.peak_between(quantity, -coulomb, coulomb)] if coulomb else []
+            return [*found, *(self.peak_between(quantity, at_rest, at_rest) for at_rest in resting)]
+        length = self.pieces_of(quantity).length
+        if kind == "rms":
+            squares = [mean_square(self.polynomial(quantity, at_rest)[0]) @ length for at_rest in resting]
+            return [math.sqrt(square / self.case.end_time) for square in squares]
+        return [absolute_integral(self.polynomial(quantity)[1], length)]
+
+    def peak_between(self, quantity: str, rest_above: float, rest_below: float) -> float:
+        above, below = self.polynomial(quantity, rest_above)[1], self.polynomial(quantity, rest_below)[1]
+        return highest(np.concatenate([above, -below]), 0.0, 1e-9)[0]
+
+
+def _friction_signs(velocity: Array, rest: float) -> list[Array]:
+    """Signs of friction at samples, by convention (see `Case.conventions`)."""
+    sign = np.sign(velocity)
+    resting = np.abs(velocity) <= rest
+    return [np.where(resting, 0.0, sign), np.where(resting, 1.0, sign), np.where(resting, -1.0, sign), sign]
+
+
+def _norm(norm: str | None, values: Array, weights: Array, duration: float) -> float:
+    if norm == "l1":
+        return float(weights @ np.abs(values))
+    if norm == "l2":
+        return math.sqrt(weights @ np.square(values) / duration)
+    return float(np.max(np.abs(values))) if norm == "linf" else 0.0

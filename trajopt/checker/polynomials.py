@@ -1,0 +1,199 @@
+"""Polynomials on 0 <= s <= 1 in powers and in Bernstein form: rows of floats, or whole numbers over a denominator."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import cache
+from operator import mul
+from typing import TypeAlias
+
+import numpy as np
+
+from trajopt.checker.case import Array
+from trajopt.checker.report import to_float
+
+Poly: TypeAlias = tuple[list[int], int]  # coefficients of powers (or Bernstein polynomials) of s, over one denominator
+
+
+@cache
+def _to_bernstein(degree: int) -> tuple[list[list[int]], int]:
+    """Integer rows and a divisor that turn coefficients of powers of s into Bernstein coefficients on 0 <= s <= 1."""
+    divisor = math.lcm(*(math.comb(degree, i) for i in range(degree + 1)))
+    rows = [[math.comb(k, i) * divisor // math.comb(degree, i) for i in range(k + 1)] for k in range(degree + 1)]
+    return rows, divisor
+
+
+# in floats, a row for each polynomial
+
+
+def product(a: Array, b: Array) -> Array:
+    found = np.zeros((len(a), a.shape[1] + b.shape[1] - 1))
+    for i in range(a.shape[1]):
+        found[:, i : i + b.shape[1]] += a[:, i : i + 1] * b
+    return found
+
+
+def bernstein(rows: Array) -> Array:
+    """Bernstein coefficients: the first and last are values at the ends, all values lie between the extremes."""
+    return rows @ _bernstein_matrix(rows.shape[1] - 1) if rows.shape[1] > 1 else rows
+
+
+@cache
+def _bernstein_matrix(degree: int) -> Array:
+    table, divisor = _to_bernstein(degree)
+    return np.array([row + [0] * (len(table) - len(row)) for row in table], dtype=np.float64).T / divisor
+
+
+def _halves(rows: Array) -> Array:
+    """Bernstein coefficients on both halves (de Casteljau): all left ones, then all right ones."""
+    count, width = rows.shape
+    found, row = np.empty((2 * count, width)), rows
+    for i in range(width):
+        found[:count, i], found[count:, width - 1 - i] = row[:, 0], row[:, -1]
+        row = (row[:, 1:] + row[:, :-1]) / 2
+    return found
+
+
+def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, float]:
+    """The highest value of polynomials in Bernstein form, to ``slack`` and ``relative``; 0 if that is higher.
+
+    Returns the value, the index of the polynomial and s. NaN when it cannot be told, for rounding.
+    """
+    best, where, crowd = 0.0, (0, 0.0), 4 * len(rows) + 1000
+    index, start, width = np.arange(len(rows)), np.zeros(len(rows)), 1.0
+    for _ in range(60):
+        ends = np.maximum(rows[:, 0], rows[:, -1])
+        k = int(np.argmax(ends))
+        if ends[k] > best:
+            best, where = float(ends[k]), (int(index[k]), float(start[k] + (0.0 if rows[k, 0] == ends[k] else width)))
+        bounds = np.max(rows, axis=1)
+        still_open = ~(bounds <= best + slack + relative * best)
+        if not np.any(still_open):
+            return best, *where
+        if np.count_nonzero(still_open) > crowd or not math.isfinite(float(np.max(bounds))):
+            break
+        rows, width = _halves(rows[still_open]), width / 2
+        index, start = np.tile(index[still_open], 2), np.concatenate([start[still_open], start[still_open] + width])
+    return math.nan, *where
+
+
+def absolute_integral(rows: Array, length: Array) -> float:
+    """The integral of |p| over all pieces, split where p changes its sign."""
+    total, slack = 0.0, 1e-13 * np.max(np.abs(rows))
+    enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
+    for _ in range(60):
+        whole = np.all(rows >= -slack, axis=1) | np.all(rows <= slack, axis=1)
+        total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
+        rows, length = rows[~whole], length[~whole]
+        if len(rows) == 0 or np.sum(length * np.max(np.abs(rows), axis=1)) <= enough:
+            break
+        rows, length = _halves(rows), np.tile(length / 2, 2)
+    return total
+
+
+def mean_square(rows: Array) -> Array:
+    """The mean of p squared over each piece, from its coefficients."""
+    square = product(rows, rows)
+    return square @ (1.0 / np.arange(1, square.shape[1] + 1))
+
+
+# in whole numbers
+
+
+def constant(x: Fraction) -> Poly:
+    return [x.numerator], x.denominator
+
+
+def plus(p: Poly, q: Poly) -> Poly:
+    unit = math.lcm(p[1], q[1])
+    a, b = unit // p[1], unit // q[1]
+    found = [a * x for x in p[0]] + [0] * (len(q[0]) - len(p[0]))
+    for i, x in enumerate(q[0]):
+        found[i] += b * x
+    return found, unit
+
+
+def times(p: Poly, q: Poly) -> Poly:
+    found = [0] * (len(p[0]) + len(q[0]) - 1)
+    for i, x in enumerate(p[0]):
+        for j, y in enumerate(q[0]):
+            found[i + j] += x * y
+    return found, p[1] * q[1]
+
+
+def bernstein_exactly(poly: Poly) -> Poly:
+    values, unit = poly
+    table, divisor = _to_bernstein(len(values) - 1)
+    return [sum(map(mul, row, values)) for row in table], unit * divisor
+
+
+def _halves_exactly(row: Poly) -> tuple[Poly, Poly]:
+    """Bernstein coefficients on both halves (de Casteljau)."""
+    values, unit = row
+    degree = len(values) - 1
+    left, right = [values[0] << degree], [values[-1] << degree]
+    for rest in reversed(range(degree)):
+        values = [a + b for a, b in zip(values, values[1:], strict=False)]
+        left.append(values[0] << rest)
+        right.append(values[-1] << rest)
+    return (left, unit << degree), (right[::-1], unit << degree)
+
+
+def highest_exactly(rows: list[Poly], slack: Fraction, relative: Fraction) -> tuple[Fraction, int, Fraction]:
+    """A bound the polynomials never exceed, to ``slack`` and ``relative`` of their highest value; 0 if that is higher.
+
+    Returns the bound, the index of the polynomial and s. Rows are in Bernstein form.
+    """
+    best, where = Fraction(0), (0, Fraction(0))
+    for k, (values, unit) in enumerate(rows):
+        end = max(values[0], values[-1])
+        if end * best.denominator > best.numerator * unit:
+            best, where = Fraction(end, unit), (k, Fraction(int(values[0] != end)))
+    cut = best + slack + relative * best
+    stack = [
+        (row, k, Fraction(0), Fraction(1))
+        for k, row in enumerate(rows)
+        if max(row[0]) * cut.denominator > cut.numerator * row[1]
+    ]
+    while stack:
+        row, k, start, width = stack.pop()
+        bound = Fraction(max(row[0]), row[1])
+        if bound <= cut:
+            continue
+        left, right = _halves_exactly(row)
+        width /= 2
+        middle = Fraction(right[0][0], right[1])
+        if middle > best:
+            best, where = middle, (k, start + width)
+            cut = best + slack + relative * best
+        if width.denominator >= 2**64:  # only where no slack was given: take the bound as reached
+            best = cut = bound
+            continue
+        stack += [(left, k, start, width), (right, k, start + width, width)]
+    return (cut if best else best), *where
+
+
+def absolute_integral_exactly(rows: list[Poly], lengths: list[Fraction]) -> Fraction:
+    """The integral of |p| over all pieces, split where p changes its sign, to 1e-12 of the total."""
+    total = Fraction(0)
+    stack = list(zip(rows, lengths, strict=True))
+    bounds = (to_float(Fraction(max(map(abs, values)), unit) * length) for (values, unit), length in stack)
+    enough = Fraction(to_float(1e-13 * sum(bounds) / len(rows)))
+    while stack:
+        (values, unit), length = stack.pop()
+        if min(values) >= 0 or max(values) <= 0:
+            total += Fraction(abs(sum(values)), unit * len(values)) * length
+        elif Fraction(max(map(abs, values)), unit) * length > enough:
+            stack += [(half, length / 2) for half in _halves_exactly((values, unit))]
+    return total
+
+
+def square_integral(polys: list[Poly], lengths: list[Fraction]) -> Fraction:
+    sums: dict[int, int] = {}  # by denominator: most pieces share one, and a gcd for each would take most of the time
+    for poly, length in zip(polys, lengths, strict=True):
+        values, unit = times(poly, poly)
+        divisor = math.lcm(*range(1, len(values) + 1))
+        unit *= divisor * length.denominator
+        sums[unit] = sums.get(unit, 0) + length.numerator * sum(x * (divisor // (i + 1)) for i, x in enumerate(values))
+    return sum((Fraction(total, unit) for unit, total in sums.items()), Fraction(0))

@@ -1,0 +1,258 @@
+"""Reading plain data into a case without trust: whatever is not as a result file has it is Malformed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case, Curve, Via
+
+FORMAT: Final = "trajopt result 1"
+WITH_SOLUTION: Final = ("SOLVED", "SOLVED_LOCAL")
+WITHOUT_SOLUTION: Final = (
+    "IMPOSSIBLE", "IMPOSSIBLE_ON_GRID", "UNDECIDED", "LIMIT", "BAD_INPUT", "CRASHED", "INTERRUPTED",
+)  # fmt: skip
+LARGEST_NUMBER: Final = 1e60
+
+_NUMBERS: Final = ("objective", "duration", "metrics", "trajectory")
+_REQUIRED: Final = ("format", "trajopt", "status", "problem_hash", "problem", *_NUMBERS)
+
+
+class Malformed(ValueError):
+    """The data is not what a result file holds."""
+
+
+def read(result: Mapping[str, Any], notes: list[str]) -> Case | None:
+    """The result as a case, None when its status is one without a solution; what is beyond us goes to ``notes``."""
+    result = _mapping(result, "the result")
+    for key in _REQUIRED:
+        if key not in result:
+            raise Malformed(f"{key} is missing")
+    if result["format"] != FORMAT:
+        raise Malformed(f"format is {shown(result['format'])}, not {FORMAT!r}")
+    status = result["status"]
+    if status in WITHOUT_SOLUTION:
+        for key in _NUMBERS:
+            if result[key] is not None:
+                raise Malformed(f"{status} must carry no numbers, but {key} is not null")
+        return None
+    if status not in WITH_SOLUTION:
+        raise Malformed(f"unknown status {shown(status)}")
+    try:
+        return _solved(result, _mapping(result["problem"], "problem"), notes)
+    except RecursionError:
+        raise Malformed("nested too deeply") from None
+
+
+def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
+    _finite(problem, "problem")
+    known = ("move", "limits", "load", "objective", "transcription", "title", "source", "moral", "rotary")
+    notes += [f"problem.{key}" for key in problem if key not in known]
+    grid = _mapping(problem.get("transcription"), "problem.transcription")
+    move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via"))
+    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "coulomb", "viscous"))
+    limits = _limits(problem.get("limits", {}))
+    terms = _terms(problem.get("objective"))
+    order = _order(move, limits, terms, grid.get("scheme"))
+    time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
+    inertia = None if load.get("inertia") is None else _curve(load["inertia"], "load.inertia")
+    if inertia is None and any(name in LOADED for name in limits):
+        raise Malformed("a limit on force or power needs load.inertia")
+    if inertia is None and any(name in (*LOADED, "energy") for name, _, _ in terms):
+        raise Malformed("an objective of force, power or energy needs load.inertia")
+    return Case(
+        scheme=grid["scheme"], order=order, time=time, signal=signal,
+        start=_state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0),
+        end=_state(move.get("end"), "move.end", order, {}, 0.0),
+        via=_via(move.get("via", ()), order), limits=limits, inertia=inertia,
+        coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
+        viscous=_number(load.get("viscous", 0.0), "load.viscous"),
+        terms=terms, move_time=_move_time(move.get("time")), intervals=_whole(grid.get("intervals"), "intervals"),
+        objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
+        metrics={
+            str(name): _number(value, f"metrics.{name}")
+            for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
+        },
+        **_certificate(result.get("certificate")),
+    )  # fmt: skip
+
+
+def shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # more digits, or nesting, than Python prints
+        text = f"a {type(value).__name__} beyond printing"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _mapping(value: Any, where: str, known: Iterable[str] | None = None) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise Malformed(f"{where} is missing or not an object")
+    for key in value if known is not None else ():
+        if key not in (known or ()):
+            raise Malformed(f"{where} has {shown(key)}, which this checker does not know")
+    return value
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise Malformed(f"{where} is {shown(value)}, not a number")
+    if not abs(value) <= LARGEST_NUMBER:
+        raise Malformed(f"{where} is {shown(value)}, not finite or absurdly large")
+    return float(value)
+
+
+def _nonnegative(value: Any, where: str) -> float:
+    if (number := _number(value, where)) < 0:
+        raise Malformed(f"{where} is {number!r}, negative")
+    return number
+
+
+def _whole(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise Malformed(f"{where} is {shown(value)}, not a whole number")
+    return value
+
+
+def _finite(value: Any, where: str) -> None:
+    """Every number anywhere in the problem is finite."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            _finite(item, f"{where}.{key}")
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _finite(item, where)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        _number(value, where)
+
+
+def _vector(values: Any, where: str) -> Array:
+    if not isinstance(values, list | tuple):
+        raise Malformed(f"{where} is missing or not a list")
+    if not set(map(type, values)) <= {float, int}:
+        wrong = next(x for x in values if type(x) not in (float, int))
+        raise Malformed(f"{where} holds {shown(wrong)}, not a number")
+    try:
+        found = np.array(values, dtype=np.float64)
+    except OverflowError:
+        raise Malformed(f"{where} holds an absurdly large number") from None
+    if not np.all(np.abs(found) <= LARGEST_NUMBER):
+        raise Malformed(f"{where} holds a number that is not finite or absurdly large")
+    return found
+
+
+def _curve(value: Any, where: str) -> Curve:
+    if not isinstance(value, Mapping):
+        return Curve((0.0,), (_number(value, where),))
+    table = _mapping(value, where, ("time", "value"))
+    times, values = _vector(table.get("time"), f"{where}.time"), _vector(table.get("value"), f"{where}.value")
+    if len(times) != len(values) or len(times) == 0 or not np.all(np.diff(times) > 0):
+        raise Malformed(f"{where} is no table: as many values as times, and times must increase")
+    return Curve(tuple(times.tolist()), tuple(values.tolist()))
+
+
+def _limits(value: Any) -> dict[str, tuple[Curve | None, Curve | None]]:
+    found = {}
+    for name, limit in _mapping(value, "problem.limits", (*DERIVATIVES, *LOADED)).items():
+        sides = _mapping(limit, f"limits.{name}", ("min", "max"))
+        low, high = (
+            None if sides.get(side) is None else _curve(sides[side], f"limits.{name}.{side}") for side in ("min", "max")
+        )
+        found[name] = (low, high)
+    return found
+
+
+def _terms(value: Any) -> tuple[tuple[str, str | None, float], ...]:
+    """(quantity, norm or None, weight) of each term."""
+    found = []
+    terms = _mapping(value, "problem.objective").get("terms")
+    for term in terms if isinstance(terms, list | tuple) else ():
+        term = _mapping(term, "an objective term", ("minimize", "norm", "weight"))
+        name, norm = term.get("minimize"), term.get("norm")
+        if name not in (*DERIVATIVES, *LOADED, "energy", "time"):
+            raise Malformed(f"the objective minimizes {shown(name)}, which this checker does not know")
+        if (norm is None) != (name in ("energy", "time")) or not isinstance(norm, str | None):
+            raise Malformed(f"the norm of {name} is {shown(norm)}")
+        found.append((name, norm, _nonnegative(term.get("weight", 1.0), "weight")))
+    if not found:
+        raise Malformed("problem.objective.terms is missing or empty")
+    return tuple(found)
+
+
+def _order(move: Mapping[str, Any], limits: Iterable[str], terms: Iterable[tuple[str, Any, Any]], scheme: Any) -> int:
+    """Which derivative the problem makes the top one: the highest mentioned, a state's own being one below the top."""
+    if scheme not in ("exact", "euler"):
+        raise Malformed(f"problem.transcription.scheme is {shown(scheme)}")
+    mentioned = {*limits, *(name for name, _, _ in terms)}
+    via = move.get("via", ())
+    for state in (move.get("start", {}), move.get("end", {}), *(via if isinstance(via, list | tuple) else ())):
+        mentioned |= {f"{key} in a state" for key in _mapping(state, "a state") if state[key] is not None}
+    if mentioned & {"snap", "jerk in a state"}:
+        return 4
+    return 3 if scheme == "euler" or mentioned & {"jerk", "acceleration in a state"} else 2
+
+
+def _state(value: Any, where: str, order: int, missing: dict[str, float], default: float | None) -> dict[int, float]:
+    """The prescribed derivatives below ``order``: number of the derivative -> value."""
+    state = _mapping(value, where, (*DERIVATIVES[:4], "time") if where == "move.via" else DERIVATIVES[:4])
+    found = {}
+    for i, name in enumerate(DERIVATIVES[:order]):
+        given = state.get(name)
+        given = missing.get(name, default) if given is None else given
+        if given is not None and given != "free":
+            found[i] = _number(given, f"{where}.{name}")
+    if where == "move.end" and state.get("position") is None:
+        raise Malformed("move.end.position is missing")
+    return found
+
+
+def _via(value: Any, order: int) -> tuple[Via, ...]:
+    if not isinstance(value, list | tuple):
+        raise Malformed("move.via is not a list")
+    return tuple(
+        Via(_number(state.get("time"), "move.via.time"), _state(state, "move.via", order, {}, None)) for state in value
+    )
+
+
+def _move_time(value: Any) -> float | tuple[float, float] | None:
+    """A fixed time, a pair, or None for free."""
+    if value == "free":
+        return None
+    if isinstance(value, list | tuple):
+        if len(value) != 2:
+            raise Malformed("move.time is no pair")
+        return _number(value[0], "move.time"), _number(value[1], "move.time")
+    return _number(value, "move.time")
+
+
+def _trajectory(value: Any, scheme: Any, order: int, notes: list[str]) -> tuple[Array, tuple[Array, ...]]:
+    found = _mapping(value, "trajectory")
+    if found.get("scheme") != scheme:
+        raise Malformed(f"trajectory.scheme is {shown(found.get('scheme'))}, the problem asks for {scheme}")
+    if found.get("order") != order or isinstance(found.get("order"), bool):
+        raise Malformed(f"trajectory.order is {shown(found.get('order'))}, the problem needs {order}")
+    time = _vector(found.get("time"), "trajectory.time")
+    if len(time) < 2 or time[0] != 0 or not np.all(np.diff(time) > 0):
+        raise Malformed("trajectory.time must start at 0 and increase")
+    if time[-1] < 1 / LARGEST_NUMBER:
+        raise Malformed(f"the move takes {float(time[-1])!r} s, absurdly short")
+    signal = tuple(_vector(found.get(name), f"trajectory.{name}") for name in DERIVATIVES[: order + 1])
+    for i, values in enumerate(signal):
+        if len(values) != (wanted := len(time) - (i == order)):
+            raise Malformed(f"trajectory.{DERIVATIVES[i]} has {len(values)} values where {wanted} belong")
+    known = ("scheme", "order", "time", *DERIVATIVES[: order + 1])
+    notes += [f"trajectory.{key}" for key in found if key not in known]
+    return time, signal
+
+
+def _certificate(value: Any) -> dict[str, Any]:
+    if value is None:
+        return {"lower_bound": None, "gap": None, "has_certificate": False}
+    found = _mapping(value, "certificate")
+    numbers = {
+        key: None if found.get(key) is None else _number(found[key], f"certificate.{key}")
+        for key in ("lower_bound", "gap")
+    }
+    return {**numbers, "has_certificate": True}
