@@ -1,0 +1,207 @@
+"""The long random test: thousands of specs over processes, a table of verdicts, and every failure by its seed.
+
+python -m tests.soak --specs 20000 --seed 1 --workers 2
+python -m tests.soak --seeds 17 --show        one spec again, and what was made of it
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from tests.campaign import Record, draw, judge, remarks, shrunk
+
+STORE: Final = Path(__file__).parents[1] / ".soak"
+SPECS: Final = 20_000
+MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
+PATIENCE: Final = 600.0  # s without any answer: the workers hang
+_RECYCLE: Final = 400  # specs a worker judges: solvers leak
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the campaign; 1 when anything is fatal."""
+    options = _options(arguments)
+    seeds = options.seeds or range(options.seed * 1_000_000, options.seed * 1_000_000 + options.specs)
+    console = Console(stderr=True)
+    since = time.monotonic()
+    if options.show:
+        records = [_shown(seed, console, options.shrink) for seed in seeds]
+    else:
+        records = list(_watched(_run(seeds, options.workers, since + options.seconds), len(seeds), console))
+    summary = summarise(records, time.monotonic() - since)
+    _print(summary, console)
+    if not options.show:
+        STORE.mkdir(exist_ok=True)
+        path = STORE / f"seed{options.seed}_{len(records)}.json"
+        path.write_text(json.dumps(summary, indent=1))
+        console.print(f"written: {path}")
+    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED)
+
+
+def _options(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__.splitlines()[0])
+    parser.add_argument("--specs", type=int, default=SPECS, help="how many specs (20000)")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="which campaign (1): its specs have seeds from SEED million on"
+    )
+    parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
+    parser.add_argument("--seeds", type=int, nargs="+", help="only the specs of these seeds")
+    parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
+    parser.add_argument(
+        "--shrink", action="store_true", help="with --show: simplify what fails as far as it still does"
+    )
+    return parser.parse_args(arguments)
+
+
+def work(seed: int) -> Record:
+    """Draw and judge one spec, in a worker."""
+    return judge(draw(seed))
+
+
+def _quiet() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")  # the workers inherit it
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_quiet, max_tasks_per_child=_RECYCLE)
+
+
+def _run(seeds: Iterable[int], workers: int, deadline: float) -> Iterator[Record]:
+    """The records as they come. Specs in flight when a worker dies are judged again, each in a process of its own."""
+    waiting, suspects = iter(seeds), []
+    pool = _pool(workers)
+    flying: dict[Future[Record], int] = {}
+    try:
+        while True:
+            while (
+                len(flying) < 3 * workers and time.monotonic() < deadline and (seed := next(waiting, None)) is not None
+            ):
+                flying[pool.submit(work, seed)] = seed
+            if not flying:
+                break
+            done, _ = wait(flying, timeout=PATIENCE, return_when=FIRST_COMPLETED)
+            try:
+                if not done:
+                    raise BrokenProcessPool("no answer")
+                for future in done:
+                    record = future.result()
+                    del flying[future]
+                    yield record
+            except BrokenProcessPool:
+                suspects += flying.values()
+                flying = {}
+                _end(pool)
+                pool = _pool(workers)
+        pool.shutdown()
+    finally:
+        _end(pool)
+    for seed in suspects:
+        yield _alone(seed)
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    processes = list((pool._processes or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.kill()
+
+
+def _alone(seed: int) -> Record:
+    pool = _pool(1)
+    try:
+        return pool.submit(work, seed).result(timeout=PATIENCE)
+    except (BrokenProcessPool, TimeoutError) as error:
+        return Record(seed, "CRASHED", failures=[f"crash: the process died or hung ({type(error).__name__})"])
+    finally:
+        _end(pool)
+
+
+def _watched(records: Iterable[Record], count: int, console: Console) -> Iterator[Record]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    fatal = 0
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("0 fatal", total=count)
+        for record in records:
+            for failure in record.failures:
+                progress.console.print(f"seed {record.seed} {record.status}: {failure}", highlight=False, markup=False)
+            fatal += bool(record.failures)
+            progress.update(task, advance=1, description=f"{fatal} fatal")
+            yield record
+
+
+def _shown(seed: int, console: Console, shrink: bool) -> Record:
+    spec = draw(seed)
+    console.print_json(json.dumps(spec.to_dict()))
+    record = judge(spec, thorough=True)
+    console.print_json(json.dumps(asdict(record)))
+    if shrink and remarks(record):
+        console.print("shrunk to")
+        console.print_json(json.dumps(shrunk(spec).to_dict()))
+    return record
+
+
+def summarise(records: list[Record], seconds: float) -> dict[str, Any]:
+    """Counts and failures, plain data."""
+    counts = Counter(count for record in records for count in record.counts)
+    convex = sum(record.convex and record.status != "REFUSED" for record in records)
+    undecided = sum(n for count, n in counts.items() if count.endswith("well-posed"))
+    return {
+        "specs": len(records),
+        "solves": sum(record.solves for record in records),
+        "seconds": seconds,
+        "verdicts": dict(Counter(record.status or "EXCEPTION" for record in records).most_common()),
+        "counts": dict(counts.most_common()),
+        "convex": convex,
+        "undecided_share": undecided / max(convex, 1),
+        "fatal": sum(bool(record.failures) for record in records),
+        "failures": [{"seed": r.seed, "status": r.status, "why": r.failures} for r in records if r.failures],
+        "noted": [
+            {"seed": r.seed, "counts": r.counts, "message": r.message[:400]}
+            for r in records if any(count != "not strict" for count in r.counts)
+        ],
+        "slowest": [[r.seed, round(r.seconds, 1)] for r in sorted(records, key=lambda r: -r.seconds)[:10]],
+    }  # fmt: skip
+
+
+def _print(summary: dict[str, Any], console: Console) -> None:
+    table = Table(title=f"{summary['specs']} specs, {summary['solves']} solves in {summary['seconds']:.0f} s")
+    table.add_column("verdict or remark")
+    table.add_column("specs", justify="right")
+    for name, count in (*summary["verdicts"].items(), *summary["counts"].items()):
+        table.add_row(name, str(count))
+    table.add_row("undecided, of well-posed convex", f"{100 * summary['undecided_share']:.3g} %")
+    table.add_row("fatal", str(summary["fatal"]))
+    console.print(table)
+    for failure in summary["failures"]:
+        for why in failure["why"]:
+            console.print(f"seed {failure['seed']} {failure['status']}: {why}", highlight=False, markup=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,195 @@
+"""One builder, several models: CVXPY with Clarabel or OSQP and Pyomo with Ipopt find the same optimum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trajopt
+from tests.conftest import axis, solved, term
+
+LIMITS = {"velocity": (-0.1, 1.7), "acceleration": (-9.0, 7.0), "jerk": (-90.0, 70.0)}
+LOAD = {"inertia": 2.0, "viscous": 3.0}
+FRICTION = {**LOAD, "coulomb": 2.0}
+HEAVIER = {"inertia": {"time": [0.0, 0.4, 1.0], "value": [2.0, 2.0, 5.0]}, "viscous": 1.0}
+SLOWER = {
+    "velocity": {"min": -0.5, "max": trajopt.Table(time=(0.0, 0.33, 0.6, 1.0), value=(2.0, 2.0, 1.1, 1.1))},
+    "acceleration": {"time": [0.0, 0.5, 1.0], "value": [10.0, 6.0, 12.0]},
+}
+
+CASES: dict[str, dict[str, Any]] = {
+    f"{name}-{norm}": {"minimize": name, "norm": norm, "limits": LIMITS, "load": LOAD}
+    for name in ("position", "velocity", "acceleration", "jerk", "snap", "force")
+    for norm in ("l1", "l2", "linf")
+} | {
+    "limits-by-time": {"minimize": "acceleration", "norm": "l2", "limits": SLOWER},
+    "limits-by-time-l1": {"minimize": "acceleration", "norm": "l1", "limits": SLOWER},
+    "via": {
+        "minimize": "jerk",
+        "norm": "l2",
+        "via": (trajopt.Via(time=0.37, position=0.6, velocity=1.0), trajopt.Via(time=0.6, position=0.7)),
+    },
+    "via-linf": {"minimize": "acceleration", "norm": "linf", "via": (trajopt.Via(time=0.37, position=0.6),)},
+    "free-end": {
+        "minimize": "acceleration",
+        "norm": "l1",
+        "limits": LIMITS,
+        "end": {"velocity": "free", "acceleration": "free"},
+    },
+    "free-end-position": {
+        "minimize": "jerk",
+        "norm": "l2",
+        "distance": "free",
+        "end": {"velocity": 1.5, "acceleration": "free"},
+    },
+    "free-start": {
+        "minimize": "jerk",
+        "norm": "linf",
+        "limits": {"position": (-1.0, 2.0), "velocity": (-0.3, 2.0)},
+        "start": {"position": "free", "velocity": -0.2, "acceleration": "free"},
+    },
+    "friction-l1": {
+        "minimize": "force",
+        "norm": "l1",
+        "load": FRICTION,
+        "limits": {"velocity": (0.0, 1.7), "acceleration": 9.0, "force": 25.0},
+    },
+    "friction-l2": {
+        "minimize": "force",
+        "norm": "l2",
+        "load": FRICTION,
+        "limits": {"velocity": (0.0, 1.7), "acceleration": 9.0, "jerk": 90.0},
+    },
+    "friction-backwards": {
+        "minimize": "force",
+        "norm": "linf",
+        "load": FRICTION,
+        "distance": -1.0,
+        "limits": {"velocity": (-1.7, 0.0), "acceleration": 9.0},
+    },
+    "mass-by-time-l2": {"minimize": "force", "norm": "l2", "limits": {"jerk": 90.0}, "load": HEAVIER},
+    "mass-by-time-linf": {"minimize": "force", "norm": "linf", "limits": {"acceleration": 9.0}, "load": HEAVIER},
+    "sum-of-linear": {
+        "minimize": [term("jerk", "l1", 0.1), term("velocity", "linf", 2.0)],
+        "limits": LIMITS,
+    },
+    "sum-with-cones": {
+        "minimize": [term("jerk", "l2", 0.1), term("velocity", "l2", 2.0), term("force", "linf", 0.1)],
+        "limits": LIMITS,
+        "load": LOAD,
+    },
+    "euler-jerk-l1": {"minimize": "jerk", "norm": "l1", "limits": LIMITS, "scheme": "euler"},
+    "euler-force-l2": {
+        "minimize": "force",
+        "norm": "l2",
+        "limits": {"velocity": (0.0, 1.7)},
+        "load": FRICTION,
+        "scheme": "euler",
+    },
+    "euler-sum": {
+        "minimize": [term("acceleration", "l2"), term("jerk", "linf", 0.1)],
+        "limits": LIMITS,
+        "scheme": "euler",
+    },
+}
+QUADRATIC = (
+    "acceleration-l2",
+    "jerk-l2",
+    "snap-l2",
+    "force-l2",
+    "limits-by-time",
+    "via",
+    "free-end-position",
+    "friction-l2",
+    "mass-by-time-l2",
+    "euler-force-l2",
+)
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_cvxpy_and_pyomo_agree(case: str) -> None:
+    """The same convex problem to 1e-7; the profile as well, wherever a strictly convex norm determines it."""
+    convex = solved(axis(**CASES[case], intervals=30))
+    local = solved(axis(**CASES[case], intervals=30, solver="ipopt"))
+    assert (convex.route.solver, local.route.solver) == ("clarabel", "ipopt")
+    assert convex.status is trajopt.Verdict.SOLVED
+    assert convex.objective == pytest.approx(local.objective, rel=1e-7)
+    assert convex.certificate["lower_bound"] <= local.objective * (1 + 1e-9)
+    if CASES[case].get("norm") == "l2" and CASES[case]["minimize"] not in ("position", "velocity"):
+        top = convex.trajectory.chain[-1]
+        assert np.max(np.abs(top - local.trajectory.chain[-1])) <= 1e-3 * np.max(np.abs(top))
+
+
+@pytest.mark.parametrize("case", QUADRATIC)
+def test_osqp_agrees_on_quadratic_programs(case: str) -> None:
+    clarabel = solved(axis(**CASES[case], intervals=30))
+    osqp = solved(axis(**CASES[case], intervals=30, solver="osqp"))
+    assert osqp.route.solver == "osqp"
+    assert osqp.objective == pytest.approx(clarabel.objective, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "problem, words",
+    [
+        (axis("power", "l2", load=LOAD, solver="clarabel"), "product"),
+        (axis("energy", load=LOAD, solver="osqp"), "product"),
+        (axis("force", "l2", load=FRICTION, solver="clarabel"), "friction"),
+        (axis([term("time"), term("jerk", "l2")], time="free", limits={"jerk": 50.0}, solver="clarabel"), "duration"),
+        (axis([term("jerk", "l2"), term("velocity", "linf")], solver="osqp"), "second-order cone"),
+    ],
+    ids=["power", "energy", "friction", "free-time", "cone"],
+)
+def test_a_wrong_manual_choice_is_refused_with_the_reason(problem: trajopt.Problem, words: str) -> None:
+    for ask in (trajopt.route, trajopt.solve):
+        with pytest.raises(trajopt.BadInput, match=words) as refusal:
+            ask(problem)
+        assert problem.transcription.solver in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+        assert refusal.value.exit_code == 2
+
+
+def test_the_route_follows_the_curvature() -> None:
+    routes = {
+        "linear": axis("jerk", "l1"),
+        "quadratic": axis("jerk", "l2"),
+        "cone": axis([term("jerk", "l2"), term("velocity", "linf")]),
+        "product": axis("power", "linf", load=LOAD),
+        "search": axis("time", time="free", limits=LIMITS),
+    }
+    for word, problem in routes.items():
+        route = trajopt.route(problem)
+        assert word in route.reason
+        assert route.model == ("pyomo" if word == "product" else "cvxpy")
+
+
+@pytest.mark.parametrize("scheme", ["exact", "euler"])
+def test_a_power_limit_that_stays_inactive_costs_nothing(scheme: str) -> None:
+    """Solved as a convex program without it, and the check confirms that it holds."""
+    limited = axis("jerk", "l2", limits={"power": 1e3}, load=LOAD, scheme=scheme)
+    free = axis("jerk", "l2", load=LOAD, scheme=scheme)
+    assert solved(limited).route.model == "cvxpy"
+    assert solved(limited).objective == pytest.approx(solved(free).objective, rel=1e-9)
+
+
+def test_an_active_power_limit_goes_to_ipopt_and_costs_something() -> None:
+    free = solved(axis("jerk", "l2", load=LOAD))
+    most = 0.8 * free.metrics["peak_power"]
+    limited = solved(axis("jerk", "l2", limits={"power": most}, load=LOAD))
+    assert limited.route.solver == "ipopt"
+    assert "power" in limited.route.reason
+    assert limited.metrics["peak_power"] <= most * (1 + 1e-6)
+    assert limited.objective > free.objective
+    assert limited.certificate["lower_bound"] <= limited.objective
+
+
+def test_nonconvex_programs_do_not_depend_on_how_they_are_asked_for() -> None:
+    """Energy is the L1 norm of power, and m v_peak² for a move one way."""
+    limits = {"velocity": (0.0, 1.7), "acceleration": 9.0, "jerk": 90.0}
+    energy = solved(axis("energy", limits=limits, load={"inertia": 2.0}, intervals=30))
+    power = solved(axis("power", "l1", limits=limits, load={"inertia": 2.0}, intervals=30))
+    peak = solved(axis("velocity", "linf", limits=limits, intervals=30))
+    assert energy.objective == pytest.approx(power.objective, rel=1e-9)
+    assert energy.objective >= 2.0 * peak.objective**2 * (1 - 3e-8)
+    assert energy.metrics["energy"] == pytest.approx(2.0 * energy.metrics["peak_velocity"] ** 2, rel=1e-6)

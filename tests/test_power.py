@@ -1,0 +1,73 @@
+"""The cone bound of power and energy: published gaps, agreement with Ipopt, and never above what Ipopt finds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trajopt
+from tests.conftest import axis, solved, table_i, term
+
+MIXTURE = [term("energy", weight=0.5), term("power", "linf", weight=0.5)]
+TABLE_I_GAPS = [  # exact scheme, N = 200: the objective (computed independently), the gap to certify
+    ("power", "l2", np.sqrt(1.85727772), 1e-4),
+    ("power", "linf", 1.68200675, 5e-4),
+    ("energy", None, 0.811147924, 1e-8),
+    (MIXTURE, None, 0.5 * 1.222303 + 0.5 * 1.814183, 1e-3),
+]
+
+
+@pytest.mark.parametrize(("minimize", "norm", "value", "gap"), TABLE_I_GAPS, ids=["l2", "linf", "energy", "mixture"])
+def test_value_and_gap_on_the_axis_of_table_i(minimize: object, norm: str | None, value: float, gap: float) -> None:
+    solution = solved(table_i(minimize, norm))  # type: ignore[arg-type]
+    assert solution.route.solver == "clarabel"
+    assert solution.objective == pytest.approx(value, rel=1e-6 if minimize is MIXTURE else 1e-7)
+    assert solution.certificate["gap"] <= gap
+
+
+def test_energy_closes_the_gap_and_is_solved_globally() -> None:
+    assert solved(table_i("energy")).status is trajopt.Verdict.SOLVED
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_bound_lies_below_ipopt_and_the_descent_agrees_with_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time, distance = rng.uniform(0.5, 3.0), rng.uniform(0.05, 2.0)
+    mean = distance / time
+    limits = {
+        "velocity": (0.0, mean * rng.uniform(1.6, 4.0)),
+        "acceleration": mean / time * rng.uniform(8.0, 40.0),
+        "jerk": mean / time**2 * rng.uniform(80.0, 900.0),
+    }
+    load = {"inertia": 2.0} | ({"viscous": 0.3, "coulomb": 0.2} if seed % 3 == 0 else {})
+    minimize, norm = (("power", "l2"), ("power", "linf"), ("energy", None))[seed % 3]
+    given = {"distance": distance, "time": time, "limits": limits, "load": load, "intervals": 60}
+    ours, ipopt = (solved(axis(minimize, norm, solver=solver, **given)) for solver in ("auto", "ipopt"))  # type: ignore[arg-type]
+    assert ours.objective is not None and ipopt.objective is not None
+    assert ours.certificate["lower_bound"] <= min(ours.objective, ipopt.objective) * (1 + 1e-8)
+    assert ours.objective <= ipopt.objective * (1 + 1e-6)
+    if not load.get("viscous"):
+        assert ours.certificate["gap"] <= 5e-3
+
+
+@pytest.mark.parametrize("limits", [{"velocity": (0.0, 0.5)}, {"velocity": (0.0, 0.5), "acceleration": 4.0}])
+@pytest.mark.filterwarnings("error")
+def test_missing_limits_leave_the_reach_open(limits: dict[str, object]) -> None:
+    terms = [term("energy"), term("jerk", "l2", weight=0.01)]
+    solution = solved(axis(terms, distance=0.254, limits=limits, load={"inertia": 10.0}, intervals=60))
+    assert solution.certificate["lower_bound"] <= solution.objective
+
+
+def test_backwards_costs_what_forwards_costs() -> None:
+    limits = {"acceleration": 4.905, "jerk": 98.1}
+    there = solved(table_i("power", "linf", limits=limits | {"velocity": (0.0, 0.5)}, intervals=60))
+    back = solved(table_i("power", "linf", limits=limits | {"velocity": (-0.5, 0.0)}, distance=-0.254, intervals=60))
+    assert back.objective == pytest.approx(there.objective, rel=1e-8)
+    assert back.certificate["lower_bound"] == pytest.approx(there.certificate["lower_bound"], rel=1e-8)
+
+
+def test_reversing_moves_say_that_no_bound_is_known() -> None:
+    solution = solved(
+        table_i("power", "linf", limits={"velocity": 0.5, "acceleration": 4.905, "jerk": 98.1}, intervals=40)
+    )
+    assert solution.certificate["lower_bound"] is None and "no bound known" in solution.certificate["bounds"]

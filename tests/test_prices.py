@@ -1,0 +1,56 @@
+"""Prices, each verified by a re-solve."""
+
+from __future__ import annotations
+
+import pytest
+
+import trajopt
+from trajopt.explain import widened
+from trajopt.problem import Problem
+
+
+def clemen_rupp(*overrides: str) -> Problem:
+    """The axis of Table I with overrides."""
+    return trajopt.load("clemen_rupp_jerk_l2", overrides)
+
+
+CASES = {
+    "jerk l1": ('objective={minimize="jerk", norm="l1"}',),
+    "velocity l2, tight": ('objective={minimize="velocity", norm="l2"}', 'move.time="0.7 s"'),
+    "weighted": ('objective.terms=[{minimize="acceleration", norm="linf"}, {minimize="jerk", norm="l2", weight=0.1}]',),
+    "force": ('objective={minimize="force", norm="linf"}', 'load.viscous="30 N s/m"', 'limits.force="60 N"'),
+    "power l2": ('objective={minimize="power", norm="l2"}',),
+    "power limit": ('objective={minimize="jerk", norm="l2"}', 'limits.power="2 W"'),
+    "euler": ('objective={minimize="jerk", norm="l1"}', 'transcription.scheme="euler"'),
+}
+STEP = 1e-3
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_prices_are_what_a_resolve_costs(case: str) -> None:
+    problem = clemen_rupp("transcription.intervals=100", *CASES[case])
+    solution = trajopt.solve(problem)
+    assert solution.prices
+    for price in solution.prices:
+        if price["per_percent"] is None or abs(price["per_percent"]) < 1e-5:  # lost in the solver's tolerance
+            continue
+        more, less = (trajopt.solve(changed(problem, price["name"], 1 + s)).objective for s in (STEP, -STEP))
+        measured = (more - less) / (2 * STEP) / solution.objective / 100  # type: ignore[operator]
+        assert price["per_percent"] == pytest.approx(measured, rel=2e-3), price["name"]
+
+
+def test_price_of_a_least_time() -> None:
+    problem = clemen_rupp('objective={minimize="time"}', 'move.time="free"', "transcription.intervals=100")
+    solution = trajopt.solve(problem)
+    assert {price["name"] for price in solution.prices} == {"velocity.max", "acceleration", "jerk"}
+    for price in solution.prices:
+        more, less = (trajopt.solve(changed(problem, price["name"], 1 + s)).duration for s in (STEP, -STEP))
+        assert price["per_percent"] == pytest.approx((more - less) / (2 * STEP) / solution.duration / 100, rel=2e-3)  # type: ignore[operator]
+
+
+def changed(problem: Problem, name: str, factor: float) -> Problem:
+    if name == "time":
+        return problem.replace(move=problem.move.model_copy(update={"time": problem.move.fixed_time * factor}))  # type: ignore[operator]
+    quantity, _, side = name.partition(".")
+    limit = getattr(problem.limits, quantity)
+    return widened(problem, name, (limit.lowest if side == "min" else limit.highest) * factor)

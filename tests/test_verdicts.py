@@ -1,0 +1,72 @@
+"""Verdicts at the edges: what must not be called impossible, solved or a bug, and what a failure leaves behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import trajopt
+from tests.conftest import axis
+from trajopt.verdict import Verdict
+
+
+@pytest.mark.parametrize(("minimize", "norm"), [("jerk", "l2"), ("jerk", "l1"), ("acceleration", "linf")])
+def test_coasting_costs_nothing(minimize: str, norm: str) -> None:
+    moving = {"velocity": 0.254}
+    solution = trajopt.solve(axis(minimize, norm, distance=0.254, start=moving, end=moving, limits={"jerk": 98.0}))
+    assert solution.status is Verdict.SOLVED and solution.objective == 0.0
+    assert solution.metrics["peak_velocity"] == pytest.approx(0.254)
+
+
+def test_standing_still_is_solved() -> None:
+    solution = trajopt.solve(axis("jerk", "l2", distance=0.0))
+    assert solution.status is Verdict.SOLVED and solution.objective == 0.0
+
+
+def test_a_state_outside_its_limit_by_a_rounding_is_taken_as_on_it() -> None:
+    limits = {"velocity": (0.0, 0.5), "acceleration": 4.905, "jerk": 98.1}
+    inside, outside = (
+        trajopt.solve(axis("jerk", "l2", distance=0.3, start={"velocity": v}, limits=limits))
+        for v in (0.5, 0.5 * (1 + 1e-10))
+    )
+    assert outside.status is Verdict.SOLVED
+    assert outside.objective == pytest.approx(inside.objective, rel=1e-8)
+
+
+def test_friction_at_rest_is_no_proof_of_impossibility() -> None:
+    """Coasting with F = 0 against 5 N of friction stops after 0.1 m; the force limit of 2 N would not hold it moving,
+    but nothing need hold it at rest."""
+    limits = {"velocity": (0.0, 2.0), "force": (-10.0, 2.0)}
+    load = {"inertia": 1.0, "coulomb": 5.0}
+    problem = axis("acceleration", "l2", distance=0.1, start={"velocity": 1.0}, limits=limits, load=load)
+    assert not trajopt.solve(problem).status.value.startswith("IMPOSSIBLE")
+
+
+def test_an_explanation_cut_short_claims_nothing() -> None:
+    limits = {"velocity": (0.0, 0.5), "acceleration": 4.905, "jerk": 98.1}
+    for seconds in (0.05, 0.2, 0.4):
+        text = " ".join(
+            trajopt.solve(axis(distance=0.254, norm="l2", time=0.55, limits=limits), seconds=seconds).explanation.get(
+                "text", ()
+            )
+        )
+        if "no value of" in text:
+            assert "velocity.max" not in text.partition("no value of")[2].partition(" alone")[0]
+
+
+def test_a_failure_leaves_no_numbers_of_an_earlier_answer(tmp_path: Path) -> None:
+    trajopt.solve(axis("jerk", "l2", distance=0.1)).save(tmp_path)
+    assert (tmp_path / "trajectory.csv").exists()
+    failed = trajopt.solve(axis("jerk", "l2", distance=0.1, time=0.01, limits={"velocity": 1.0}))
+    assert failed.status is Verdict.IMPOSSIBLE
+    failed.save(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+    with pytest.raises(trajopt.NoSolution):
+        _ = failed.frame
+
+
+def test_a_limit_of_nothing_is_a_limit() -> None:
+    solution = trajopt.solve(axis("jerk", "l1", intervals=5000, limits={"jerk": 98.0}), seconds=0.01)
+    assert solution.status is Verdict.LIMIT
+    assert solution.objective is None and not solution.metrics and solution.trajectory is None
