@@ -28,9 +28,9 @@ def minimum_time(setting: Setting, clock: Clock) -> Attempt:
     search = _Search(setting, clock)
     try:
         shortest = search.least()
+        bound = search.bound_below(shortest)
     except _Stopped as stop:
         return Attempt(stop.outcome)
-    bound = search.bound_below(shortest)
     attempt, sign = search.attempt(shortest), search.binding[shortest]
     if attempt.trajectory is None:
         return Attempt(Outcome(Claim.FAILED, "the shortest duration could not be confirmed"))
