@@ -1,15 +1,16 @@
 """A relaxation that every continuous move satisfies: what it cannot do, no mesh and no control can.
 
 Between nodes each limited derivative may do anything within its limits. An interval then sees it only through its
-moments ∫(t1-s)^(r-1)/(r-1)! x(s) ds and ∫(s-t0)^(r-1)/(r-1)! x(s) ds, each within [lower, upper]·h^r/r!. The moments
-are what Taylor's formula leaves of the lower derivatives, forward and backward. Infeasibility of this program is
-impossibility in continuous time.
+moments ∫(t1-s)^a/a! (s-t0)^b/b! x(s) ds, each within [lower, upper]·h^(a+b+1)/(a+b+1)!. The moments with b = 0 and
+a = 0 are what Taylor's formula leaves of the lower derivatives, forward and backward; the mixed ones are combinations.
+Infeasibility of this program is impossibility in continuous time. With nodes at the switching times of a shortest move
+it is sharp: costates are polynomials between them, of one sign, and the moments are their Bernstein coefficients.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import factorial
+from math import comb, factorial
 from typing import Any, Final
 
 import numpy as np
@@ -79,8 +80,9 @@ def _rows(setting: Setting, duration: float, model: Any, by: Any) -> None:
             _within(model, chain[i], lower, upper, sizes.derivative[i], by, 1.0)
         for r in range(1, i + 1):
             weight = steps**r / factorial(r)
-            for moment in (_forward(model, chain, steps, i, r), _backward(model, chain, steps, i, r)):
-                lower, upper = weight * limit.lowest, weight * limit.highest
+            lower, upper = weight * limit.lowest, weight * limit.highest
+            for b in range(r):
+                moment = _moment(model, chain, steps, i, r - 1 - b, b)
                 _within(model, moment, lower, upper, sizes.derivative[i - r], by, sizes.derivative[i] * weight)
 
 
@@ -92,6 +94,17 @@ def _within(model: Any, x: Any, lower: Floats, upper: Floats, size: float, by: A
             some = x if len(active) == len(bound) else x[active]
             wide = np.where(bound[active], np.abs(bound[active]), np.broadcast_to(unit, bound.shape)[active])
             model.nonpositive(sign * (some - bound[active]) - by * wide, size)
+
+
+def _moment(model: Any, chain: list[Any], steps: Any, i: int, a: int, b: int) -> Any:
+    """(N,) ∫(t1-s)^a/a! (s-t0)^b/b! x_i ds."""
+    if not a:
+        return _backward(model, chain, steps, i, b + 1)
+    moment = _forward(model, chain, steps, i, a + b + 1) * ((-1.0) ** b * comb(a + b, b))
+    for c in range(b):  # (s-t0)^b by powers of h - (t1-s)
+        share = (-1.0) ** c * comb(a + c, c) / factorial(b - c)
+        moment = moment + model.times(share * steps ** (b - c), _forward(model, chain, steps, i, a + c + 1))
+    return moment
 
 
 def _forward(model: Any, chain: list[Any], steps: Any, i: int, r: int) -> Any:
