@@ -26,9 +26,9 @@ def test_moments_are_the_integrals_they_stand_for(order: int) -> None:
     chain = EXACT.rollout(rng.normal(size=order), rng.normal(size=5), steps)
     points = np.outer(steps, (GAUSS + 1) / 2)
     for i in range(1, order + 1):
-        at = [x[:5, None] for x in chain[i:]]
-        values = sum(points**r / factorial(r) * x for r, x in enumerate(at))
-        for a, b in [(a, b) for a in range(i) for b in range(i - a)]:
+        left = [x[:5, None] for x in chain[i:]]
+        values = sum(points**r / factorial(r) * x for r, x in enumerate(left))
+        for a, b in ((a, r - 1 - a) for r in range(1, i + 1) for a in range(r)):
             kernel = (steps[:, None] - points) ** a / factorial(a) * points**b / factorial(b)
             integral = steps / 2 * ((kernel * values) @ WEIGHTS)
             assert _moment(OnFloats(), chain, steps, i, a, b) == pytest.approx(integral, rel=1e-9, abs=1e-11)
