@@ -164,6 +164,29 @@ def _without(section: str, text: str = LINEAR) -> str:
     return "\n[".join(part for part in parts if not part.startswith(f"{section}]"))
 
 
+def _vibrations() -> Iterator[Bad]:
+    for name, mode, words in (
+        ("without-frequency", "damping = 0.1", ("vibration[0].frequency: is missing", "8 Hz")),
+        ("frequency-unit", 'frequency = "8 m"', ("vibration[0].frequency", "a frequency is needed", "8 Hz")),
+        ("frequency-zero", 'frequency = "0 Hz"', ("vibration[0].frequency: must be > 0",)),
+        ("band-falls", 'frequency = ["9 Hz", "8 Hz"], residual = "1 um"', ("a band needs min < max",)),
+        ("band-of-three", 'frequency = ["7 Hz", "8 Hz", "9 Hz"]', ("vibration[0].frequency: needs one", "3 values")),
+        ("band-at-zero", 'frequency = ["7 Hz", "9 Hz"]', ("residual: no move leaves a whole band at zero",)),
+        ("damping-one", 'frequency = "8 Hz", damping = 1.0', ("vibration[0].damping", "below 1", "not per cent")),
+        ("damping-text", 'frequency = "8 Hz", damping = "2 %"', ("vibration[0].damping", "0.02")),
+        ("residual-unit", 'frequency = "8 Hz", residual = "1 s"', ("vibration[0].residual", "a position is needed")),
+        ("residual-negative", 'frequency = "8 Hz", residual = "-1 mm"', ("vibration[0].residual: must be 0 or more",)),
+        ("robust-text", 'frequency = "8 Hz", robust = "yes"', ("vibration[0].robust: must be true or false",)),
+        ("unknown-key", 'frequncy = "8 Hz"', ("vibration[0].frequncy: unknown key", "'frequency'")),
+    ):
+        yield _set(f"vibration-{name}", f"vibration=[{{ {mode} }}]", words=words)
+    quiet = 'vibration=[{ frequency = "8 Hz" }]'
+    yield _set("vibration-euler", quiet, "transcription.scheme=euler", words=("vibration", 'scheme = "exact"'))
+    ranged = ('move.time=["0.5 s", "2 s"]', quiet)
+    yield _set("vibration-time-range", *ranged, words=("vibration: needs a fixed move.time",))
+    yield _set("vibration-no-list", "vibration=3", words=("vibration: must be a list", "8 Hz"))
+
+
 _UNKNOWN: Final = {  # misspelt key: the one meant
     "mvoe.time": "'move'",
     "limts.velocity": "'limits'",
@@ -279,6 +302,7 @@ def _contradictions() -> Iterator[Bad]:
     yield _set("range-and-via", 'move.time=["1 s","2 s"]', via, words=("move.time", "via states need a fixed"))
     mass = 'load={mass={time=["0 s","1 s"], value=["1 kg","2 kg"]}}'
     yield _set("free-and-changing-mass", *free, mass, words=("move.time", "inertia that varies"))
+    yield from _vibrations()
     for name, value in (("falls", '["2 s","1 s"]'), ("equal", '["1 s","1 s"]'), ("zero", '["0 s","1 s"]')):
         yield _set(f"time-range-{name}", f"move.time={value}", words=("move.time: needs 0 < min < max", "got min"))
     yield _set("time-of-three", 'move.time=["1 s","2 s","3 s"]', words=("move.time: needs one time", "3 values"))

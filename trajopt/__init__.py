@@ -22,7 +22,7 @@ _HOMES = {
     "Solution": "trajopt.solution",
     "Verdict": "trajopt.verdict",
     **dict.fromkeys(
-        ("Problem", "Move", "State", "Via", "Limits", "Load", "Objective", "Term", "Transcription"),
+        ("Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Transcription"),
         "trajopt.problem",
     ),
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -63,6 +63,8 @@ class Attempt:
         return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
 
 
+ENOUGH: Final = 1e-7  # gap: no further rung of the ladder is climbed
+
 Goal = Callable[[Transcript], Lowered]
 
 
@@ -75,7 +77,7 @@ def convex(
     widen: Sequence[str] = (),
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
-    run is optimal within 1e-7 by our own bound, or infeasible by a checked certificate.
+    run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable (see
     `trajopt.transcribe.transcribe`).
@@ -97,7 +99,7 @@ def convex(
         outcome = model.run(rung, clock.left())
         clock.charge("solve", since)
         attempt = _read(setting, transcript, lowered, outcome)
-        if attempt.gap <= 1e-7 or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
+        if attempt.gap <= ENOUGH or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
             return attempt
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
             best = attempt

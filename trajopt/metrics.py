@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import polynomial
 
+from trajopt import vibration
 from trajopt.mesh import Floats
 from trajopt.problem import DERIVATIVES
 from trajopt.signals import Signal, product
@@ -15,7 +16,8 @@ from trajopt.trajectory import Trajectory
 
 
 def metrics(trajectory: Trajectory) -> dict[str, float]:
-    """Peaks and RMS of velocity to the top derivative, distance ∫|v|dt; with a load force, power and energy ∫|P|dt.
+    """Peaks and RMS of velocity to the top derivative, distance ∫|v|dt; with a load force, power and energy ∫|P|dt; the
+    amplitude left in each mode of `Problem.vibration`.
 
     SI. For the Euler scheme, values at the nodes and their sums (energy by the trapezoidal rule, as in Table II).
     """
@@ -32,6 +34,8 @@ def metrics(trajectory: Trajectory) -> dict[str, float]:
     found["distance"] = absolute_integral(trajectory, trajectory.signal("velocity"), plain=True)
     if "power" in names:
         found["energy"] = absolute_integral(trajectory, trajectory.signal("power"))
+    for k, mode in enumerate(trajectory.problem.vibration, start=1):
+        found[f"residual_vibration_{k}"] = vibration.left_by(trajectory, mode)
     return found
 
 

@@ -101,6 +101,36 @@ def plot_prices(solution: Solution) -> Axes:
     return axes
 
 
+def plot_vibration(solution: Solution, frequency: Any = None, damping: float | None = None) -> Axes:
+    """What the move leaves in a mode, over its frequency (Hz): the amplitude after the move, relative to the stroke.
+
+    By default around the modes of ``problem.vibration``, which are marked, with the damping of the first. Raises
+    NoSolution.
+    """
+    from trajopt.vibration import residual
+
+    trajectory = _moved(solution)
+    asked = trajectory.problem.vibration
+    bands = [m.frequency if isinstance(m.frequency, tuple) else (m.frequency, m.frequency) for m in asked]
+    if frequency is None:
+        top = 2 * max((band[1] for band in bands), default=4 / trajectory.duration)
+        frequency = np.linspace(top / 400, top, 800)
+    if damping is None:
+        damping = asked[0].damping if asked else 0.0
+    stroke = float(np.max(np.abs(trajectory.chain[0] - trajectory.chain[0][0]))) or 1.0
+    figure = Figure(figsize=(7.0, 3.4), layout="constrained", facecolor="white")
+    axes = figure.subplots()
+    axes.semilogy(frequency, np.maximum(residual(trajectory, frequency, damping) / stroke, 1e-9), color=COLOURS[0])
+    for band in bands:
+        axes.axvspan(*band, color=SHADE, alpha=0.6, linewidth=0 if band[0] < band[1] else 3)
+    axes.set_xlabel("natural frequency of the mode [Hz]")
+    axes.set_ylabel("amplitude left / stroke")
+    axes.grid(color="0.92", linewidth=0.7)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title(solution.problem.title or "Residual vibration", loc="left", fontweight="bold", fontsize=11)
+    return axes
+
+
 def compare(
     solutions: Mapping[str, Solution], dashed: Mapping[str, Solution] | None = None, title: str = ""
 ) -> Panels:

@@ -20,6 +20,7 @@ def refuse_contradictions(problem: Problem) -> None:
     _time(problem)
     _load(problem)
     _via(problem)
+    _vibration(problem)
     for where, state in _states(problem):
         _within_limits(problem, where, state)
     _doomed(problem)
@@ -88,6 +89,16 @@ def _via(problem: Problem) -> None:
                 f"move.via[{off}].time: {times[off]:g} s must be a multiple of the euler step"
                 f" {duration / problem.transcription.intervals:g} s; change it or transcription.intervals"
             )
+
+
+def _vibration(problem: Problem) -> None:
+    if not problem.vibration:
+        return
+    if problem.transcription.scheme == "euler":
+        raise ValueError('vibration: needs transcription.scheme = "exact"')
+    only_time = [term.minimize for term in problem.objective.terms] == ["time"]
+    if problem.move.fixed_time is None and not only_time:
+        raise ValueError('vibration: needs a fixed move.time such as "1 s", or time as the only objective')
 
 
 def _within_limits(problem: Problem, where: str, state: State) -> None:

@@ -245,6 +245,43 @@ class Objective(Section):
         return self
 
 
+def _frequency(value: Any, info: ValidationInfo) -> Any:
+    pair = value if isinstance(value, list | tuple) else [value]
+    if len(pair) not in (1, 2):
+        raise ValueError(f'needs one frequency such as "8 Hz" or a band [min, max], got {len(pair)} values')
+    found = [si(x, "frequency", info) for x in pair]
+    if found[0] <= 0 or found[-1] < found[0] or (len(found) == 2 and found[0] == found[1]):
+        raise ValueError(f"must be > 0, and a band needs min < max, got {shown(value)}")
+    return found[0] if len(found) == 1 else (found[0], found[1])
+
+
+def _damping(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+        raise ValueError(f"must be a plain damping ratio such as 0.02, got {shown(value)}")
+    if not 0 <= value < 1:
+        raise ValueError(f"must be 0 or more and below 1 (a ratio, not per cent), got {shown(value)}")
+    return float(value)
+
+
+class Vibration(Section):
+    """A mode that hangs on the axis and must be quiet after the move (see `trajopt.vibration`).
+
+    ``frequency`` Hz, one or a band (min, max); ``damping`` ratio; ``residual``: the amplitude it may keep, m or rad,
+    zero by default; ``robust``: the derivative of the residual by the frequency is held, too (ZVD).
+    """
+
+    frequency: Annotated[float | tuple[float, float], BeforeValidator(_frequency)]
+    damping: Annotated[float, BeforeValidator(_damping)] = 0.0
+    residual: Annotated[float, nonnegative("position")] = 0.0
+    robust: Annotated[bool, Field(strict=True)] = False
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if isinstance(self.frequency, tuple) and not self.residual:
+            raise ValueError('residual: no move leaves a whole band at zero; write for example residual = "1 um"')
+        return self
+
+
 class Transcription(Section):
     """How the problem is to be discretised and by whom solved; nothing of it changes the move that is meant."""
 
@@ -260,6 +297,7 @@ class Problem(Section):
     objective: Objective
     limits: Limits = Limits()
     load: Load = Load()
+    vibration: tuple[Vibration, ...] = ()
     transcription: Transcription = Transcription()
     title: str = ""
     source: str = ""

@@ -31,11 +31,13 @@ _EXAMPLES: Final = {  # what to write for what is missing
     "move.time": 'write time = "1 s", or "free"',
     "move.end": 'write end = { position = "0.25 m" }',
     "move.via.time": 'write { time = "0.5 s", position = "0.1 m" }',
+    "vibration.frequency": 'write [[vibration]] with frequency = "8 Hz"',
     "objective": 'write [objective] with minimize = "jerk" and norm = "l2"',
     "objective.terms": 'write minimize = "jerk" and norm = "l2", or terms',
     "objective.terms.minimize": f"write minimize = one of {', '.join(p.MINIMIZABLE)}",
 }
 _LISTS: Final = {
+    "vibration": '[{ frequency = "8 Hz" }]',
     "via": '[{ time = "0.5 s", position = "0.1 m" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,6 +78,19 @@ class Solution:
 
         return plot_prices(self)
 
+    def residual_vibration(self, frequency: Any, damping: float = 0.0) -> Any:
+        """The amplitude (m or rad) left in modes of natural frequencies in Hz and a damping ratio that hang on the
+        axis; the shape of ``frequency``, one-dimensional. Raises NoSolution."""
+        from trajopt.vibration import residual
+
+        return residual(self._moved(), frequency, damping)
+
+    def plot_vibration(self, frequency: Any = None, damping: float | None = None) -> Axes:
+        """Residual vibration over the frequency of a mode; see `trajopt.plot.plot_vibration`. Raises NoSolution."""
+        from trajopt.plot import plot_vibration
+
+        return plot_vibration(self, frequency, damping)
+
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data, numbers null where there is no solution."""
         problem = self.problem.canonical()
@@ -101,7 +114,8 @@ class Solution:
         }
 
     def save(self, directory: str | Path) -> list[Path]:
-        """Write result.json, trajectory.csv, trajectory.png and prices.png into ``directory``; returns the paths.
+        """Write result.json, trajectory.csv, trajectory.png, prices.png and, where vibration is limited, vibration.png
+        into ``directory``; returns the paths.
 
         Without a solution only result.json is written. Raises OSError.
         """
@@ -109,16 +123,25 @@ class Solution:
 
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)
+        pictures: dict[str, Callable[[], Any]] = {
+            "trajectory.png": lambda: self.plot()[0],
+            "prices.png": self.plot_prices,
+            "vibration.png": self.plot_vibration,
+        }
         written = [directory / "result.json"]
-        for stale in ("trajectory.csv", "trajectory.png", "prices.png"):  # of another answer
+        for stale in ("trajectory.csv", *pictures):  # of another answer
             (directory / stale).unlink(missing_ok=True)
         write_atomically(written[0], json.dumps(self.to_dict(), indent=1, allow_nan=False).encode())
-        if self.trajectory is not None:
-            written += [directory / "trajectory.csv", directory / "trajectory.png", directory / "prices.png"]
-            write_csv(self, written[1])
-            for path, axes in zip(written[2:], (self.plot()[0], self.plot_prices()), strict=True):
-                figure: Any = axes.figure
-                figure.savefig(path, dpi=150)
+        if self.trajectory is None:
+            return written
+        written.append(directory / "trajectory.csv")
+        write_csv(self, written[-1])
+        if not self.problem.vibration:
+            del pictures["vibration.png"]
+        for name, draw in pictures.items():
+            figure: Any = draw().figure
+            figure.savefig(directory / name, dpi=150)
+            written.append(directory / name)
         return written
 
     def __repr__(self) -> str:

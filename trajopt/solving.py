@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 import norms
-from trajopt.attempt import Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
+from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
 from trajopt.conclude import conclude, first_solved
 from trajopt.model import Claim, Outcome
 from trajopt.power import descend, linearised, relax
@@ -82,8 +82,21 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     duration = setting.problem.move.fixed_time
     assert duration is not None
     attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, chosen.solver), clock)
-    candidates = [break_tie(lean, attempt, chosen, clock), (attempt, chosen)]
-    return first_solved(setting, candidates, clock), attempt
+    return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
+
+
+def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Clock) -> Iterator[tuple[Attempt, Route]]:
+    """The tie-broken answer, the first one, and where neither passes what the rungs make of it that were not needed."""
+    yield break_tie(lean, first, chosen, clock)
+    yield first, chosen
+    if first.trajectory is None or first.gap > ENOUGH or chosen.solver != "clarabel":
+        return
+    from trajopt.model_cvxpy import LADDER
+
+    for rung in LADDER[1:]:
+        other = convex(lean, first.trajectory.duration, to(lean.problem.objective), clock, rung)
+        if other.trajectory is not None:
+            yield _priced(lean, other, clock), chosen
 
 
 def _shortest(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from trajopt import vibration
 from trajopt.fields import Limit
 from trajopt.mesh import Floats, Mesh, mesh_for
 from trajopt.model import own_size
@@ -78,6 +79,8 @@ def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, 
     transcript = Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen)
     for name, limit in problem.limits.given().items():
         _limit(transcript, name, limit)
+    for mode in problem.vibration:
+        vibration.rows(transcript, mode)
     return transcript
 
 

@@ -97,6 +97,7 @@ def _derivatives(base: str, angle: int) -> dict[str, Kind]:
 _COMMON: Final = {
     "time": Kind("time", (0, 0, 1, 0, 0), "s", "0.5 s"),
     "power": Kind("power", (2, 1, -3, 0, 0), "W", "100 W"),
+    "frequency": Kind("frequency", (0, 0, -1, 0, 0), "Hz", "8 Hz"),
     "energy": Kind("energy", (2, 1, -2, 0, 0), "J", "1 J"),
 }
 LINEAR: Final = (

@@ -18,6 +18,7 @@ DERIVATIVES: Final = ("position", "velocity", "acceleration", "jerk", "snap")
 LOADED: Final = ("force", "power")
 SPLITS: Final = 40  # halvings of one interval in search of a change of sign
 VALUE: Final = 1e-6  # of an objective, a metric or a gap
+BAND: Final = 41  # frequencies at which a band of them is looked at
 EPS: Final = float(np.finfo(float).eps)
 
 _TIME: Final = 1e-12
@@ -54,6 +55,22 @@ class Via:
 
 
 @dataclass(frozen=True)
+class Mode:
+    """``frequency`` Hz: one, or both ends of a band; ``damping`` ratio; ``residual`` amplitude allowed, m or rad."""
+
+    frequency: tuple[float, ...]
+    damping: float
+    residual: float
+    robust: bool
+
+    @property
+    def points(self) -> list[float]:
+        """The frequencies to look at."""
+        found: list[float] = np.linspace(self.frequency[0], self.frequency[-1], BAND).tolist()
+        return found if len(self.frequency) > 1 else list(self.frequency)
+
+
+@dataclass(frozen=True)
 class Case:
     """A result with a solution. ``signal[i]`` is the i-th derivative: (N+1,) at nodes, the top one (N,)."""
 
@@ -77,6 +94,7 @@ class Case:
     lower_bound: float | None
     gap: float | None
     has_certificate: bool
+    vibration: tuple[Mode, ...] = ()
 
     @property
     def count(self) -> int:

@@ -18,6 +18,7 @@ from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
 from trajopt.checker.reading import Malformed, read
 from trajopt.checker.report import Check, Report, question
 from trajopt.checker.result_file import CheckerInputError, read_json, table_fault
+from trajopt.checker.vibration import vibration_checks
 
 
 def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *, strict: bool = False) -> Report:
@@ -34,7 +35,7 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
     checks.append(question("structure"))
     if case is None:
         return _report(checks, strict, strict, notes)
-    checks += [*time_checks(case), *certificate_checks(case, notes)]
+    checks += [*time_checks(case), *certificate_checks(case, notes), *vibration_checks(case)]
     decided, rational = decide(case, strict, notes)
     return _report(checks + decided, rational, strict, notes)
 

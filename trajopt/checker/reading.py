@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case, Curve, Via
+from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case, Curve, Mode, Via
 
 FORMAT: Final = "trajopt result 1"
 WITH_SOLUTION: Final = ("SOLVED", "SOLVED_LOCAL")
@@ -48,7 +48,7 @@ def read(result: Mapping[str, Any], notes: list[str]) -> Case | None:
 
 def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
     _finite(problem, "problem")
-    known = ("move", "limits", "load", "objective", "transcription", "title", "source", "moral", "rotary")
+    known = ("move", "limits", "load", "vibration", "objective", "transcription", "title", "source", "moral", "rotary")
     notes += [f"problem.{key}" for key in problem if key not in known]
     grid = _mapping(problem.get("transcription"), "problem.transcription")
     move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via"))
@@ -75,6 +75,7 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
             str(name): _number(value, f"metrics.{name}")
             for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
         },
+        vibration=_vibration(problem.get("vibration", ())),
         **_certificate(result.get("certificate")),
     )  # fmt: skip
 
@@ -214,6 +215,22 @@ def _via(value: Any, order: int) -> tuple[Via, ...]:
     return tuple(
         Via(_number(state.get("time"), "move.via.time"), _state(state, "move.via", order, {}, None)) for state in value
     )
+
+
+def _vibration(value: Any) -> tuple[Mode, ...]:
+    if not isinstance(value, list | tuple):
+        raise Malformed("vibration is not a list")
+    found = []
+    for mode in value:
+        mode = _mapping(mode, "a vibration", ("frequency", "damping", "residual", "robust"))
+        given = mode.get("frequency")
+        points = tuple(_number(x, "frequency") for x in (given if isinstance(given, list | tuple) else (given,)))
+        damping = _nonnegative(mode.get("damping", 0.0), "damping")
+        if not 1 <= len(points) <= 2 or min(points) <= 0 or damping >= 1:
+            raise Malformed("a vibration needs a frequency > 0, or a band of two, and a damping below 1")
+        residual = _nonnegative(mode.get("residual", 0.0), "residual")
+        found.append(Mode(points, damping, residual, mode.get("robust") is True))
+    return tuple(found)
 
 
 def _move_time(value: Any) -> float | tuple[float, float] | None:
