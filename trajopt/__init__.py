@@ -17,6 +17,7 @@ _HOMES = {
     "from_dict": "trajopt.problem_file",
     "solve": "trajopt.solving",
     "route": "trajopt.routing",
+    "synchronise": "trajopt.axes",
     "check": "trajopt.checker",
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",

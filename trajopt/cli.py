@@ -1,4 +1,4 @@
-"""The command line: ``trajopt solve | check | route | problems``."""
+"""The command line: ``trajopt solve | synchronise | check | route | problems``."""
 
 from __future__ import annotations
 
@@ -44,8 +44,7 @@ def solve(
     from trajopt import preflight, problem_file
     from trajopt.worker import solve_apart
 
-    if seconds is not None and not 0.1 <= seconds <= 1e6:
-        raise BadInput(f"--seconds must be 0.1 to 1e6, got {seconds:g}")
+    _refuse_seconds(seconds)
     problem = problem_file.load(source, overrides)
     for warning in preflight.warnings(problem):
         print(f"warning: {warning}", file=sys.stderr)
@@ -60,6 +59,36 @@ def solve(
         for path in written:
             print(f"wrote {path}")
     raise typer.Exit(solution.status.exit_code)
+
+
+@app.command()
+def synchronise(
+    sources: Annotated[list[str], typer.Argument(metavar="FILE...", help="a problem an axis")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write a folder an axis into this one")] = None,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit of each solve, s")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Move several axes together: the slowest sets the time, the others take the smoothest move within it."""
+    from trajopt import problem_file
+    from trajopt.axes import synchronise as together
+    from trajopt.worker import solve_apart
+
+    _refuse_seconds(seconds)
+    solutions = together([problem_file.load(source) for source in sources], seconds, solve_apart)
+    if output is not None:
+        for k, (source, solution) in enumerate(zip(sources, solutions, strict=True), start=1):
+            solution.save(output / f"axis{k}_{Path(source).stem}")
+    worst = max((solution.status for solution in solutions), key=lambda status: status.exit_code)
+    if as_json:
+        axes = [solution.to_dict() for solution in solutions]
+        shared = max((s.duration for s in solutions if s.duration is not None), default=None)
+        print(json.dumps({"status": worst.value, "duration": shared, "axes": axes}, allow_nan=False))
+    else:
+        from trajopt.report import print_solution
+
+        for solution in solutions:
+            print_solution(solution)
+    raise typer.Exit(worst.exit_code)
 
 
 @app.command()
@@ -106,6 +135,11 @@ def problems(as_json: AsJson = False) -> None:
     width = max(len(name) for name in known)
     for name, p in known.items():
         print(f"{name:{width}}  {p.title}")
+
+
+def _refuse_seconds(seconds: float | None) -> None:
+    if seconds is not None and not 0.1 <= seconds <= 1e6:
+        raise BadInput(f"--seconds must be 0.1 to 1e6, got {seconds:g}")
 
 
 def main(arguments: list[str] | None = None) -> None:

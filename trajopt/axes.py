@@ -1,0 +1,47 @@
+"""Axes that start and end together: the slowest sets the time, the others relax into the smoothest move within it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pydantic import ValidationError
+
+from trajopt import solving
+from trajopt.attempt import smoothest
+from trajopt.errors import BadInput
+from trajopt.problem import FREE, Objective, Problem, Term
+from trajopt.problem_file import explain
+from trajopt.solution import Solution
+
+
+def synchronise(
+    problems: Sequence[Problem], seconds: float | None = None, solve: Callable[..., Solution] = solving.solve
+) -> list[Solution]:
+    """One solution an axis, all of one duration (s): the least time of the slowest.
+
+    What the problems say of time and objective is put aside; their limits, loads and states hold. The slowest axis
+    keeps its fastest move; every other minimises the L2 norm of its top derivative in the common time. Where an axis
+    has no solution (look at ``status``), its verdict stands and the others are those of their own least times.
+    ``seconds`` limits each solve; ``solve`` replaces `trajopt.solve`. Raises ValueError without any problem, and
+    BadInput for one that needs its fixed time.
+    """
+    if not problems:
+        raise ValueError("needs at least one problem to synchronise")
+    fastest = [solve(_in_time(problem, FREE, _TIME), seconds) for problem in problems]
+    if not all(solution.status.solved for solution in fastest):
+        return fastest
+    common = max(solution.duration or 0.0 for solution in fastest)
+    return [
+        solution if solution.duration == common else solve(_in_time(problem, common, smoothest(problem)), seconds)
+        for problem, solution in zip(problems, fastest, strict=True)
+    ]
+
+
+_TIME = Objective(terms=(Term(minimize="time"),))
+
+
+def _in_time(problem: Problem, time: float | str, objective: Objective) -> Problem:
+    try:
+        return problem.replace(move=problem.move.model_copy(update={"time": time}), objective=objective)
+    except ValidationError as error:
+        raise BadInput(f"{problem.title or 'an axis'}: {explain(error)}") from None
