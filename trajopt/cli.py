@@ -51,7 +51,8 @@ def solve(
     solution = solve_apart(problem, seconds)
     written = solution.save(output) if output is not None else []
     if as_json:
-        print(json.dumps(solution.to_dict(), allow_nan=False))
+        compared = solution.comparison() if solution.status.solved else []
+        print(json.dumps(solution.to_dict() | {"comparison": compared}, allow_nan=False))
     else:
         from trajopt.report import print_solution
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -32,6 +33,8 @@ def print_solution(solution: Solution) -> None:
     console.print(certificate_text(solution))
     for row in solution.prices[:3]:
         console.print(f"  {sentence(row, objective_label(solution))}")
+    for row in solution.comparison():
+        console.print(f"  {_comparison_text(row)}")
     chosen = solution.route
     console.print(f"solved by {chosen.solver} through {chosen.model}: {chosen.reason}")
     if (excess := _between_nodes(solution)) is not None:
@@ -41,6 +44,16 @@ def print_solution(solution: Solution) -> None:
     audit = solution.audit
     console.print(f"checked independently: {audit.get('checks', 0)} checks passed, tolerance {audit.get('tolerance')}")
     console.print(", ".join(f"{name} {1000 * t:.0f} ms" for name, t in solution.timings.items()))
+
+
+def _comparison_text(row: Mapping[str, Any]) -> str:
+    """``saves 26 % against the best trapezoid, which breaks the jerk limit``."""
+    if row["saving"] is None:
+        return f"no {row['profile'].removeprefix('best ')} keeps the limits"
+    breaks = f", which breaks the {' and '.join(row['breaks'])} limit" if row["breaks"] else ""
+    saving = f"{abs(100 * row['saving']):.3g} %"
+    outcome = f"saves {saving} against" if row["saving"] >= 0 else f"costs {saving} more than"
+    return f"{outcome} the {row['profile']}{breaks}"
 
 
 def objective_text(solution: Solution) -> str:

@@ -78,6 +78,15 @@ class Solution:
 
         return plot_prices(self)
 
+    def comparison(self) -> list[dict[str, Any]]:
+        """What the optimum saves against trapezoid, S-curve and quintic of the same duration, where a load pays for the
+        objective; see `trajopt.comparison`. Raises NoSolution."""
+        from trajopt.comparison import compare_with_profiles
+
+        self._moved()
+        assert self.objective is not None
+        return compare_with_profiles(self.problem, self.objective)
+
     def residual_vibration(self, frequency: Any, damping: float = 0.0) -> Any:
         """The amplitude (m or rad) left in modes of natural frequencies in Hz and a damping ratio that hang on the
         axis; the shape of ``frequency``, one-dimensional. Raises NoSolution."""
