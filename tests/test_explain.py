@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 import trajopt
-from trajopt.explain import widened
 from trajopt.problem import Problem
 from trajopt.verdict import Verdict
 
@@ -78,11 +77,11 @@ def test_each_limit_alone(impossible: tuple[Problem, trajopt.Solution]) -> None:
     assert set(cures)
     for name, cure in cures.items():
         if cure["value"] is None:
-            assert not possible(widened(problem, name, 1e3 * cure["now"] if cure["now"] else -1e3))
+            assert not possible(problem.with_limit(name, 1e3 * cure["now"] if cure["now"] else -1e3))
             continue
-        assert possible(widened(problem, name, cure["value"])), name
+        assert possible(problem.with_limit(name, cure["value"])), name
         less = cure["now"] + (cure["value"] - cure["now"]) * 0.999
-        assert not possible(widened(problem, name, less)), name
+        assert not possible(problem.with_limit(name, less)), name
 
 
 def test_all_limits_together(impossible: tuple[Problem, trajopt.Solution]) -> None:
@@ -93,7 +92,7 @@ def test_all_limits_together(impossible: tuple[Problem, trajopt.Solution]) -> No
         for name, limit in problem.limits.given().items():
             for side in ("min", "max"):
                 if getattr(limit, side):
-                    changed = widened(changed, f"{name}.{side}", getattr(limit, side) * factor)
+                    changed = changed.with_limit(f"{name}.{side}", getattr(limit, side) * factor)
         return changed
 
     factor = solution.explanation["all_limits_factor"]

@@ -156,12 +156,13 @@ def test_the_route_follows_the_curvature() -> None:
         "quadratic": axis("jerk", "l2"),
         "cone": axis([term("jerk", "l2"), term("velocity", "linf")]),
         "product": axis("power", "linf", load=LOAD),
-        "search": axis("time", time="free", limits=LIMITS),
+        "search": axis("time", time="free", limits=LIMITS, solver="clarabel"),
+        "switching times": axis("time", time="free", limits=LIMITS),
     }
     for word, problem in routes.items():
         route = trajopt.route(problem)
         assert word in route.reason
-        assert route.model == ("pyomo" if word == "product" else "cvxpy")
+        assert route.model == {"product": "pyomo", "switching times": "arcs"}.get(word, "cvxpy")
 
 
 @pytest.mark.parametrize("scheme", ["exact", "euler"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 import trajopt
-from trajopt.explain import widened
 from trajopt.problem import Problem
 
 
@@ -39,9 +38,12 @@ def test_prices_are_what_a_resolve_costs(case: str) -> None:
         assert price["per_percent"] == pytest.approx(measured, rel=2e-3), price["name"]
 
 
-def test_price_of_a_least_time() -> None:
-    problem = clemen_rupp('objective={minimize="time"}', 'move.time="free"', "transcription.intervals=100")
+@pytest.mark.parametrize(("solver", "model"), [("clarabel", "cvxpy"), ("auto", "arcs")])
+def test_price_of_a_least_time(solver: str, model: str) -> None:
+    overrides = ('objective={minimize="time"}', 'move.time="free"', "transcription.intervals=100")
+    problem = clemen_rupp(*overrides, f"transcription.solver={solver}")
     solution = trajopt.solve(problem)
+    assert solution.route.model == model
     assert {price["name"] for price in solution.prices} == {"velocity.max", "acceleration", "jerk"}
     for price in solution.prices:
         more, less = (trajopt.solve(changed(problem, price["name"], 1 + s)).duration for s in (STEP, -STEP))
@@ -53,4 +55,4 @@ def changed(problem: Problem, name: str, factor: float) -> Problem:
         return problem.replace(move=problem.move.model_copy(update={"time": problem.move.fixed_time * factor}))  # type: ignore[operator]
     quantity, _, side = name.partition(".")
     limit = getattr(problem.limits, quantity)
-    return widened(problem, name, (limit.lowest if side == "min" else limit.highest) * factor)
+    return problem.with_limit(name, (limit.lowest if side == "min" else limit.highest) * factor)

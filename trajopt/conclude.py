@@ -53,7 +53,8 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
         message = f"{outcome.raw_status}, but the gap to the lower bound is {certificate['gap']}"
     if message:
         return Solution(Verdict.UNDECIDED, problem, chosen, audit=audit, timings=clock.timings(), message=message)
-    return replace(candidate, audit=audit, prices=attempt.notes.get("prices", ()), timings=clock.timings())
+    noted = {key: attempt.notes[key] for key in ("prices", "structure") if key in attempt.notes}
+    return replace(candidate, audit=audit, timings=clock.timings(), **noted)
 
 
 def first_solved(
@@ -104,4 +105,5 @@ def _certificate(value: float, attempt: Attempt) -> dict[str, Any]:
         raise InternalError(f"lower bound {bound!r} above the answer {value!r}")
     between = attempt.trajectory is not None and attempt.trajectory.scheme.terms > 1
     about = "every move on this mesh" + (" whose Bernstein coefficients keep the limits" if between else "")
+    about = attempt.notes.get("bounds", about)
     return {"lower_bound": min(bound, value), "gap": max(gap, 0.0), "bounds": about, **starts}

@@ -19,7 +19,6 @@ from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible
 from trajopt.problem import FREE, Problem
-from trajopt.routing import waits_at_an_end
 from trajopt.scaling import sizes_of
 from trajopt.time_search import farthest, feasible_times, minimum_time
 from trajopt.transcribe import Setting, Transcript
@@ -79,7 +78,7 @@ def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
     freed = problem.move.model_copy(update={"time": FREE})
     free = replace(setting, problem=problem.model_copy(update={"move": freed}))
     free = replace(free, sizes=sizes_of(free.problem))
-    if waits_at_an_end(problem):
+    if problem.can_wait:
         attempt = minimum_time(free, clock)
         return {"least_time": attempt.trajectory.duration * (1 + ROUND) if attempt.trajectory else None}
     possible = feasible_times(free, clock)
@@ -178,13 +177,3 @@ def _reach_text(problem: Problem, low: float, high: float) -> str:
     if (target < low or target > high) and innermost * target > 0:
         return f"in the asked time the axis must go at least {innermost:.6g} {unit}"
     return f"in the asked time the axis can go {low:.6g} to {high:.6g} {unit}"
-
-
-def widened(problem: Problem, name: str, value: float) -> Problem:
-    """The problem with one limit (or one side of it, ``velocity.max``) set to a cure's value."""
-    quantity, _, side = name.partition(".")
-    limit = getattr(problem.limits, quantity)
-    assert not isinstance(limit.max, Table)
-    sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
-    limits = problem.limits.model_copy(update={quantity: Limit(**sides)})
-    return problem.replace(limits=limits)

@@ -32,7 +32,7 @@ def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, valu
         and (per_second := _time(setting, attempt, goal, duration)) is not None
     ):
         found["time"] = (per_second, per_second * duration)
-    return _ranked(setting.problem, found, value)
+    return ranked(setting.problem, found, value)
 
 
 def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> list[dict[str, Any]]:
@@ -43,7 +43,7 @@ def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float)
     found = {
         name: (-unit / per_second, -own / per_second) for name, (unit, own) in _limits(setting.problem, attempt).items()
     }
-    return _ranked(setting.problem, found, duration)
+    return ranked(setting.problem, found, duration)
 
 
 def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]]:
@@ -70,7 +70,8 @@ def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> fl
     return attempt.slope * (later - sooner) / (2 * _STEP * duration)
 
 
-def _ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:
+def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:
+    """Rows as `prices` returns them, from name -> (objective per SI unit of the limit, per unit of its own value)."""
     kinds = units.kinds(problem.rotary)
     rows: list[dict[str, Any]] = []
     for name, (unit, own) in found.items():

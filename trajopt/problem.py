@@ -197,6 +197,14 @@ def _intervals(value: Any) -> int:
     return int(value)
 
 
+def _touches(value: Any) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= 100:
+        raise ValueError(f"must be a whole number, 0 to 100, such as 2, got {shown(value)}")
+    return int(value)
+
+
 class Term(Section):
     """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt (J), or time (s)."""
 
@@ -283,11 +291,17 @@ class Vibration(Section):
 
 
 class Transcription(Section):
-    """How the problem is to be discretised and by whom solved; nothing of it changes the move that is meant."""
+    """How the problem is to be discretised and by whom solved.
+
+    ``min_dwell`` (s) and ``touches`` cut off the chattering of a snap-limited minimum time: the least time between two
+    switches, or how often the velocity limit is touched at each end.
+    """
 
     intervals: Annotated[int, BeforeValidator(_intervals)] = 200
     scheme: Literal["exact", "euler"] = "exact"
     solver: Literal["auto", "clarabel", "osqp", "ipopt"] = "auto"
+    min_dwell: Annotated[float, nonnegative("time")] = 0.0
+    touches: Annotated[int | None, BeforeValidator(_touches)] = None
 
 
 class Problem(Section):
@@ -331,9 +345,26 @@ class Problem(Section):
             return 0
         return 1 if velocity.lowest >= 0 else -1 if velocity.highest <= 0 else 0
 
+    @property
+    def can_wait(self) -> bool:
+        """Whether the axis may stand still at one end, so that more time never hurts; both positions are given."""
+        move, velocity = self.move, self.limits.velocity
+        if FREE in (move.start.position, move.end.position):
+            return False
+        may_rest = velocity is None or velocity.lowest <= 0 <= velocity.highest
+        states = [state.fixed(self.order) for state in (move.start, move.end)]
+        return may_rest and any(all(state.get(i) == 0.0 for i in range(1, self.order)) for state in states)
+
     def replace(self, **sections: Any) -> Problem:
         """A copy with sections replaced, validated again."""
         return Problem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
+
+    def with_limit(self, name: str, value: float) -> Problem:
+        """A copy with one limit (``jerk``, plus-minus) or one side of it (``velocity.max``) set to a value, SI."""
+        quantity, _, side = name.partition(".")
+        limit: Limit = getattr(self.limits, quantity)
+        sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
+        return self.replace(limits=self.limits.model_copy(update={quantity: Limit(**sides)}))
 
     @property
     def hash(self) -> str:

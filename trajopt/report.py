@@ -33,6 +33,8 @@ def print_solution(solution: Solution) -> None:
     console.print(certificate_text(solution))
     for row in solution.prices[:3]:
         console.print(f"  {sentence(row, objective_label(solution))}")
+    for line in _structure_text(solution.structure):
+        console.print(f"  {line}")
     for row in solution.comparison():
         console.print(f"  {_comparison_text(row)}")
     chosen = solution.route
@@ -44,6 +46,21 @@ def print_solution(solution: Solution) -> None:
     audit = solution.audit
     console.print(f"checked independently: {audit.get('checks', 0)} checks passed, tolerance {audit.get('tolerance')}")
     console.print(", ".join(f"{name} {1000 * t:.0f} ms" for name, t in solution.timings.items()))
+
+
+def _structure_text(structure: Mapping[str, Any]) -> list[str]:
+    """The arcs of a minimum time, and what the ordinary S-curve would lose."""
+    if "arcs" not in structure:
+        return []
+    arcs = [f"{arc['limit']} {arc['to'] - arc['from']:.4g} s" for arc in structure["arcs"]]
+    shown = arcs if len(arcs) <= 9 else [*arcs[:4], f"… {len(arcs) - 8} more …", *arcs[-4:]]
+    lines = ["arcs: " + ", ".join(shown)]
+    if structure.get("chatters"):
+        lines.append("the optimum switches without end towards the velocity limit; cut off where nothing is lost")
+    if "s_curve" in structure:
+        curve = structure["s_curve"]
+        lines.append(f"the ordinary S-curve takes {curve['duration']:.9g} s, {100 * curve['loss']:.3g} % more")
+    return lines
 
 
 def _comparison_text(row: Mapping[str, Any]) -> str:

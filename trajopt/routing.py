@@ -8,11 +8,13 @@ from typing import Any
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Problem
 from trajopt.quantities import is_affine
+from trajopt.switching_times import as_chain
 
 
 @dataclass(frozen=True)
 class Route:
-    """``model``: cvxpy or pyomo; ``solver``: clarabel, osqp or ipopt; ``reason``: one line for people."""
+    """``model``: cvxpy, pyomo, or arcs without one; ``solver``: clarabel, osqp, ipopt, or newton on switching times;
+    ``reason``: one line for people."""
 
     model: str
     solver: str
@@ -30,10 +32,19 @@ class Route:
 
 
 def route(problem: Problem) -> Route:
-    """The route of a problem: its curvature decides, unless ``transcription.solver`` asks otherwise.
+    """The route of a problem: switching times for the minimum time of a chain, else its curvature decides, unless
+    ``transcription.solver`` asks otherwise.
 
     Raises BadInput, with the reason, when the solver asked for cannot take the problem.
     """
+    wanted = problem.transcription.solver
+    if wanted == "auto" and as_chain(_lean(problem)) is not None:
+        return Route("arcs", "newton", "minimum time of a chain of integrators: its switching times, exactly")
+    return route_on_mesh(problem)
+
+
+def route_on_mesh(problem: Problem) -> Route:
+    """The route of a transcribed problem: the one there is where switching times are not asked for, or not found."""
     wanted = problem.transcription.solver
     hindrance = _nonconvex(problem)
     if wanted == "ipopt":
@@ -52,6 +63,12 @@ def route(problem: Problem) -> Route:
     return Route("cvxpy", solver, _convex_reason(problem))
 
 
+def _lean(problem: Problem) -> Problem:
+    """The problem without the limits that are tried without first."""
+    limits = problem.limits.model_copy(update=dict.fromkeys(nonaffine_limits(problem)))
+    return problem.model_copy(update={"limits": limits})
+
+
 def nonaffine_limits(problem: Problem) -> list[str]:
     """The limits that make a convex problem nonconvex; they are tried without first."""
     return [name for name in problem.limits.given() if not is_affine(problem, name)]
@@ -63,17 +80,7 @@ def is_time_search(problem: Problem) -> bool:
     Feasibility is monotone in the duration when one end is at rest: the axis can wait there.
     """
     only_time = [term.minimize for term in problem.objective.terms] == ["time"]
-    return problem.move.fixed_time is None and only_time and waits_at_an_end(problem)
-
-
-def waits_at_an_end(problem: Problem) -> bool:
-    """Whether the axis may stand still at one end, so that more time never hurts; both positions are given."""
-    move, order = problem.move, problem.order
-    if FREE in (move.start.position, move.end.position):
-        return False
-    can_wait = problem.limits.velocity is None or problem.limits.velocity.lowest <= 0 <= problem.limits.velocity.highest
-    at_rest = [all(state.fixed(order).get(i) == 0.0 for i in range(1, order)) for state in (move.start, move.end)]
-    return can_wait and any(at_rest)
+    return problem.move.fixed_time is None and only_time and problem.can_wait
 
 
 def has_power_bound(problem: Problem) -> bool:

@@ -28,7 +28,8 @@ class Solution:
 
     ``objective`` SI; ``duration`` s; ``metrics`` SI by name; ``certificate``: lower bound, gap and what it bounds;
     ``audit``: report of the independent check; ``prices``: what each limit costs (see `trajopt.prices`);
-    ``explanation`` of an impossible move (see `trajopt.explain`); ``route``: model, solver, reason; ``timings`` s.
+    ``structure``: the arcs of a minimum time (see `trajopt.switching_times`); ``explanation`` of an impossible move
+    (see `trajopt.explain`); ``route``: model, solver, reason; ``timings`` s.
     """
 
     status: Verdict
@@ -41,6 +42,7 @@ class Solution:
     audit: Mapping[str, Any] = field(default_factory=dict)
     explanation: Mapping[str, Any] = field(default_factory=dict)
     prices: Sequence[Mapping[str, Any]] = ()
+    structure: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     trajectory: Trajectory | None = None
     message: str = ""
@@ -115,6 +117,7 @@ class Solution:
             "audit": dict(self.audit) or None,
             "explanation": dict(self.explanation) or None,
             "prices": [dict(price) for price in self.prices],
+            "structure": dict(self.structure) or None,
             "route": self.route.to_dict(),
             "timings": dict(self.timings),
             "problem_hash": self.problem.hash,

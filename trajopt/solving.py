@@ -16,12 +16,15 @@ from trajopt.power import descend, linearised, relax
 from trajopt.prices import prices
 from trajopt.problem import Objective, Problem, Term
 from trajopt.quantities import is_affine
-from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route
+from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
 from trajopt.solution import Solution
+from trajopt.switching import Impossible, Unresolved
+from trajopt.switching_times import as_chain, fastest
 from trajopt.ties import break_tie, tied_route
 from trajopt.time_search import minimum_time
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, prescribed, without
+from trajopt.verdict import Verdict
 
 
 def solve(problem: Problem, seconds: float | None = None) -> Solution:
@@ -37,6 +40,12 @@ def solve(problem: Problem, seconds: float | None = None) -> Solution:
         solution = conclude(setting, chosen.because("coasting costs nothing: zero is optimal"), still, clock)
         if solution.status.solved:
             return solution
+    if chosen.model == "arcs":
+        solution = _by_arcs(setting, chosen, clock)
+        if solution.status.solved or solution.status is Verdict.IMPOSSIBLE:
+            return solution
+        on_mesh = route_on_mesh(problem)
+        chosen = on_mesh.because(f"{on_mesh.reason} (switching times: {solution.message})")
     if chosen.model == "pyomo":
         return _local(setting, chosen, clock)
     lean = without(setting, nonaffine_limits(problem))  # an answer that keeps those too is as good as with them
@@ -49,6 +58,21 @@ def solve(problem: Problem, seconds: float | None = None) -> Solution:
     if solution.status.solved or lean is setting or attempt.trajectory is None:
         return solution
     return _with_all_limits(setting, lean, attempt, clock)
+
+
+def _by_arcs(setting: Setting, chosen: Route, clock: Clock) -> Solution:
+    """Minimum time by switching times; UNDECIDED where they are not found, or a limit left out is broken."""
+    lean = without(setting, nonaffine_limits(setting.problem))
+    chain = as_chain(lean.problem)
+    assert chain is not None
+    try:
+        return conclude(setting, chosen, fastest(lean, chain, clock), clock, local=True)
+    except (Impossible, Unresolved) as reason:
+        impossible, text = isinstance(reason, Impossible), str(reason)
+        status = Verdict.IMPOSSIBLE if impossible else Verdict.UNDECIDED
+        explanation = {"continuous": True, "text": [text]} if impossible else {}
+        timings = clock.timings()
+        return Solution(status, setting.problem, chosen, explanation=explanation, timings=timings, message=text)
 
 
 def _is_affine(problem: Problem) -> bool:

@@ -1,0 +1,285 @@
+"""Exact minimum time of orders one to three: published rows, Ruckig by the thousand, degenerate and blocked moves."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+import numpy as np
+import pytest
+from ruckig import InputParameter, Result, Ruckig, Trajectory
+from scipy.optimize import linprog
+
+from trajopt.switching import Arcs, Chain, Impossible, Unresolved, audit, feasible_durations, shortest
+
+FREE = (-inf, inf)
+ROWS = [  # v0, a0, pf, vf, af, vmin, vmax, amin, amax, jerk, least time: computed independently by two routes
+    (-0.5, 0.8, 1.04, 0.54, -0.37, -1.79, 1.11, -1.94, 1.52, 3.76, 1.9483442630157684),
+    (0.69, 0.23, -4.46, 0.68, 0.64, -1.89, 1.35, -1.69, 1.28, 1.69, 5.792630075297437),
+    (-0.01, -0.68, -0.81, 0.05, -0.22, -1.78, 1.32, -1.69, 1.64, 4.57, 1.7781605884595963),
+    (0.72, 0.71, -4.07, 0.41, -0.65, -1.5, 1.78, -1.73, 1.38, 3.44, 5.871399854849041),
+    (0.77, -0.5, -1.79, -0.64, -0.78, -1.53, 1.54, -1.3, 1.44, 1.58, 3.778862565129892),
+]
+
+
+def verified(chain: Chain) -> Arcs:
+    arcs = shortest(chain)
+    verdict = audit(chain, arcs.tops, arcs.durations)
+    assert verdict.accepted and verdict.residual < 1e-9 and verdict.excess < 1e-9
+    assert len(arcs.tops) == len(arcs.active) == len(arcs.durations) and min(arcs.durations, default=0.0) >= 0
+    return arcs
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_moving_ends_and_asymmetric_limits(row: tuple[float, ...]) -> None:
+    v0, a0, pf, vf, af, vmin, vmax, amin, amax, jerk, expected = row
+    chain = Chain(3, (FREE, (vmin, vmax), (amin, amax), (-jerk, jerk)), (0.0, v0, a0), (pf, vf, af))
+    arcs = verified(chain)
+    assert arcs.duration == pytest.approx(expected, rel=1e-12)
+    assert arcs.bracket == (pytest.approx(expected, rel=1e-12), arcs.duration)
+
+
+def random_chain(rng: np.random.Generator) -> Chain | None:
+    """Asymmetric velocity and acceleration, moving ends, now and then a state on a limit or at rest; None if doomed."""
+    velocity, acceleration = ((-rng.uniform(0.3, 2), rng.uniform(0.3, 2)) for _ in range(2))
+    jerk, stroke = rng.uniform(0.5, 6), rng.normal() * rng.choice([0.1, 1, 5])
+    start, end = ([0.0, rng.uniform(*velocity), rng.uniform(*acceleration)] for _ in range(2))
+    end[0] = stroke
+    for state in (start, end):
+        if rng.uniform() < 0.1:
+            state[2] = 0.0
+        if rng.uniform() < 0.05:
+            state[1:] = [velocity[1], 0.0]
+    chain = Chain(3, (FREE, velocity, acceleration, (-jerk, jerk)), tuple(map(float, start)), tuple(map(float, end)))
+    return None if doomed(chain) else chain
+
+
+def doomed(chain: Chain) -> bool:
+    """Whether the velocity must leave its limits after the start or before the end; by the formula of this test."""
+    (low, high), jerk = chain.limits[1], chain.top[1]
+    (_, v0, a0), (_, v1, a1) = chain.start, chain.end
+    reached = v0 + a0 * abs(a0) / 2 / jerk, v1 - a1 * abs(a1) / 2 / jerk
+    return not all(low <= v <= high for v in reached)
+
+
+def by_ruckig(chain: Chain) -> float:
+    given = InputParameter(1)
+    (vmin, vmax), (amin, amax), (_, jerk) = chain.limits[1:]
+    for i, name in enumerate(("position", "velocity", "acceleration")):
+        setattr(given, f"current_{name}", [chain.start[i]])
+        setattr(given, f"target_{name}", [chain.end[i]])
+    given.min_velocity, given.max_velocity = [vmin], [vmax]
+    given.min_acceleration, given.max_acceleration, given.max_jerk = [amin], [amax], [jerk]
+    trajectory = Trajectory(1)
+    assert Ruckig(1).calculate(given, trajectory) in (Result.Working, Result.Finished)
+    return float(trajectory.duration)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ruckig_agrees_on_random_moves(seed: int) -> None:
+    rng, compared = np.random.default_rng(seed), 0
+    while compared < 500:
+        if (chain := random_chain(rng)) is not None:
+            assert verified(chain).duration == pytest.approx(by_ruckig(chain), rel=1e-9), chain
+            compared += 1
+
+
+def test_ruckig_agrees_on_degenerate_moves() -> None:
+    rng, compared = np.random.default_rng(11), 0
+    rates, strokes = [-1, -0.5, 0, 0.5, 1], [-2, -1, -1 / 6, 0, 1 / 6, 1 / 3, 0.5, 1, 4, 1e-9, 1e4]
+    while compared < 500:
+        v, a = rng.choice([0.5, 1, 2, 100], 2)
+        start, end = ([0.0, float(rng.choice(rates)), float(rng.choice(rates))] for _ in range(2))
+        end[0] = float(rng.choice(strokes))
+        limits = (FREE, (-float(v), float(v)), (-float(a), float(a)), (-1.0, 1.0))
+        chain = Chain(3, limits, tuple(start), tuple(end))
+        outside = max(abs(start[1]), abs(end[1])) > v or max(abs(start[2]), abs(end[2])) > a
+        if start == end or outside or doomed(chain):
+            continue
+        assert verified(chain).duration == pytest.approx(by_ruckig(chain), rel=1e-9, abs=1e-12), chain
+        compared += 1
+
+
+def reachable(chain: Chain, duration: float, intervals: int = 150) -> bool:
+    """Whether a top derivative constant on intervals can end where it should, limits kept at the nodes."""
+    h, n = duration / intervals, chain.order
+    lag = np.arange(intervals)[:, None] - np.arange(intervals)[None, :]
+    rows, bounds, ends, goals = [], [], [], []
+    for i in range(n):
+        power = n - i
+        late, early = np.clip(lag + 1, 0, None) * h, np.clip(lag, 0, None) * h
+        matrix = (late**power - early**power) / float(np.prod(np.arange(1, power + 1)))
+        times = h * np.arange(1, intervals + 1)
+        free = sum(x * times**k / float(np.prod(np.arange(1, k + 1))) for k, x in enumerate(chain.start[i:]))
+        low, high = chain.limits[i]
+        for sign, limit in ((1, high), (-1, -low)):
+            if limit < inf:
+                rows.append(sign * matrix[:-1])
+                bounds.append(limit - sign * free[:-1])
+        ends.append(matrix[-1])
+        goals.append(chain.end[i] - free[-1])
+    result = linprog(
+        np.zeros(intervals), np.vstack(rows), np.concatenate(bounds), np.array(ends), np.array(goals),
+        bounds=chain.top, method="highs",
+    )  # fmt: skip
+    assert result.status in (0, 2)
+    return bool(result.status == 0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_linear_program_finds_nothing_shorter_with_asymmetric_jerk(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    limits = tuple((-rng.uniform(0.5, 2), rng.uniform(0.5, 2)) for _ in range(2))
+    jerk = (-rng.uniform(1, 4), rng.uniform(1, 4))
+    start, end = (tuple(rng.uniform(-0.4, 0.4, 2)) for _ in range(2))
+    chain = Chain(3, (FREE, *limits, jerk), (0.0, *start), (rng.normal() * 2, *end))
+    least = verified(chain).duration
+    assert reachable(chain, least * 1.01) and not reachable(chain, least * 0.99)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e3])
+@pytest.mark.parametrize("row", ROWS[:2])
+def test_units_do_not_matter(row: tuple[float, ...], length: float) -> None:
+    v0, a0, pf, vf, af, vmin, vmax, amin, amax, jerk, expected = row
+    limits = (FREE, (vmin, vmax), (amin, amax), (-jerk, jerk))
+    scaled = tuple((a * length, b * length) for a, b in limits)
+    start, end = (tuple(x * length for x in state) for state in ((2.0, v0, a0), (2.0 + pf, vf, af)))
+    assert verified(Chain(3, scaled, start, end)).duration == pytest.approx(expected, rel=1e-10)
+
+
+def test_mirrored_and_reversed_moves_take_as_long() -> None:
+    limits = (FREE, (-1.5, 0.8), (-1.1, 1.9), (-3.0, 2.0))
+    chain = Chain(3, limits, (1.0, 0.3, -0.4), (-1.2, 0.5, 0.2))
+    for other in (chain.mirrored(), chain.reversed(), chain.reversed().mirrored()):
+        assert verified(other).duration == pytest.approx(verified(chain).duration, rel=1e-13)
+
+
+def test_closed_forms_of_lower_orders() -> None:
+    assert verified(Chain(1, (FREE, (-2.0, 4.0)), (1.0,), (0.0,))).duration == 0.5
+    assert verified(Chain(2, (FREE, FREE, (-2.0, 2.0)), (0.0, 0.0), (3.0, 0.0))).duration == pytest.approx(sqrt(6))
+    held = verified(Chain(2, (FREE, (-1.0, 1.0), (-2.0, 1.0)), (0.0, 0.5), (4.0, 0.0)))
+    assert held.durations == pytest.approx((0.5, 4.0 - 0.375 - 0.25, 0.5))
+    assert held.active == ("acceleration.max", "velocity.max", "acceleration.min")
+    jerk = verified(Chain(3, (FREE, FREE, FREE, (-2.0, 2.0)), (0.0,) * 3, (5.0, 0.0, 0.0)))
+    assert jerk.duration == pytest.approx((32 * 5 / 2) ** (1 / 3), rel=1e-12)
+
+
+def test_second_order_back_and_forth() -> None:
+    chain = Chain(2, (FREE, (-2.0, 2.0), (-1.0, 1.0)), (0.0, 1.0), (0.0, -0.5))
+    # down to -p and up again: 1/2 - p²/2 - (p² - 1/4)/2 = 0
+    assert verified(chain).duration == pytest.approx(0.5 + 2 * sqrt(0.625), rel=1e-12)
+
+
+def test_feasible_durations_of_a_running_start() -> None:
+    blocked = Chain(3, (FREE, (-1.2, 1.2), (-1.0, 1.0), (-5.0, 5.0)), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0))
+    (first, last), (again, forever) = feasible_durations(blocked)
+    assert (first, forever) == (pytest.approx(0.9, rel=1e-12), inf)
+    assert last == pytest.approx(1.28344, abs=1e-4) and again == pytest.approx(3.11709, abs=1e-3)
+    assert verified(blocked).duration == first
+    for inside in (first * 1.002, last * 0.998, again * 1.002):
+        assert reachable(blocked, inside)
+    for outside in (first * 0.998, last * 1.002, 2.0, again * 0.998):
+        assert not reachable(blocked, outside)
+    forwards = Chain(3, (FREE, (0.0, 1.2), *blocked.limits[2:]), blocked.start, blocked.end)
+    assert feasible_durations(forwards) == [(pytest.approx(first), pytest.approx(last))]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_feasible_durations_against_linear_programs(seed: int) -> None:
+    rng = np.random.default_rng(200 + seed)
+    limits = (FREE, (-0.3, 1.5), (-1.0, 1.2), (-4.0, 3.0))
+    chain = Chain(3, limits, (0.0, rng.uniform(0.5, 1.2), 0.0), (rng.uniform(0.3, 1.5), rng.uniform(0.5, 1.2), 0.1))
+    intervals = feasible_durations(chain)
+    for duration in np.geomspace(0.3, 12.0, 25):
+        edges = [edge for pair in intervals for edge in pair]
+        if min(abs(duration / edge - 1) for edge in edges) > 0.01:
+            inside = any(low <= duration <= high for low, high in intervals)
+            assert reachable(chain, float(duration), 100) == inside, duration
+
+
+def moving_snap(rng: np.random.Generator) -> Chain:
+    """A fourth-order chain with moving ends and unequal limits on everything."""
+    limits = [(-x * rng.uniform(0.6, 1.6), x * rng.uniform(0.6, 1.6)) for x in (1.0, 1.0, 2.0, 8.0)]
+    start, end = ((0.0, *rng.uniform(-0.4, 0.4, 2), rng.uniform(-0.5, 0.5)) for _ in range(2))
+    return Chain(4, (FREE, *limits), start, (rng.normal() * rng.choice([0.3, 1.0, 3.0]), *end[1:]))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_fourth_order_with_moving_ends(seed: int) -> None:
+    chain = moving_snap(np.random.default_rng(400 + seed))
+    arcs = verified(chain)
+    assert 0.7 * arcs.duration < arcs.lowest <= arcs.duration
+    assert reachable(chain, arcs.duration * 1.01) and not reachable(chain, arcs.duration * 0.99)
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_fourth_order_mirrored_and_reversed(seed: int) -> None:
+    chain = moving_snap(np.random.default_rng(400 + seed))
+    for other in (chain.mirrored(), chain.reversed(), chain.scaled(1e-6, 1.0)):
+        assert verified(other).duration == pytest.approx(verified(chain).duration, rel=1e-9)
+
+
+def test_a_fourth_order_move_with_running_ends_chatters_at_its_plateau() -> None:
+    limits = (FREE, (-1.0, 1.0), (-1.5, 1.5), (-4.0, 4.0), (-20.0, 20.0))
+    chain = Chain(4, limits, (0.0, 0.2, 0.0, 0.0), (6.0, 0.2, 0.0, 0.0))
+    losses = []
+    best = verified(chain)
+    for touches in range(3):
+        arcs = shortest(chain, touches=touches)
+        assert audit(chain, arcs.tops, arcs.durations).accepted and len(arcs.touches) == 2 * touches
+        losses.append(arcs.duration / best.duration - 1)
+    assert best.chatters and losses[0] > 100 * losses[1] > 1e4 * losses[2] >= 0
+
+
+def test_nothing_to_do_takes_no_time() -> None:
+    state = (3.0, 0.2, -0.1)
+    assert shortest(Chain(3, (FREE, (-1.0, 1.0), FREE, (-1.0, 1.0)), state, state)).bracket == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "start", "end", "reason"),
+    [
+        ((FREE, (-1.0, 1.0), FREE, (-1.0, 1.0)), (0.0, 0.9, 1.0), (5.0, 0.0, 0.0), "after the start the velocity must"),
+        ((FREE, (-1.0, 1.0), FREE, (-1.0, 1.0)), (0.0, 0.0, 0.0), (5.0, 0.9, -1.0), "before the end the velocity must"),
+        ((FREE, (-1.0, 1.0), FREE, (-1.0, 1.0)), (0.0, 2.0, 0.0), (5.0, 0.0, 0.0), "velocity at the start is 2"),
+        (((-1.0, 1.0), FREE, (-1.0, 1.0)), (0.0, 0.0), (2.0, 0.0), "position at the end is 2"),
+        ((FREE, (0.0, 1.0), FREE, (-1.0, 1.0)), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), "no move covers -1"),
+        ((FREE, (0.0, 1.0)), (0.0,), (-1.0,), "no move covers -1"),
+    ],
+)
+def test_impossible_moves_say_why(
+    limits: tuple[tuple[float, float], ...], start: tuple[float, ...], end: tuple[float, ...], reason: str
+) -> None:
+    with pytest.raises(Impossible, match=reason):
+        shortest(Chain(len(start), limits, start, end))
+
+
+def test_a_position_limit_in_the_way_is_not_guessed() -> None:
+    ends = (0.0, 0.9, 0.0), (0.0, -0.9, 0.0)
+    limits = ((-1.0, 0.2), (-1.0, 1.0), (-1.0, 1.0), (-5.0, 5.0))
+    with pytest.raises(Unresolved, match="no duration|no structure"):
+        shortest(Chain(3, limits, *ends))
+    assert verified(Chain(3, ((-1.0, 1.0), *limits[1:]), *ends)).duration > 0
+
+
+@pytest.mark.parametrize(
+    ("order", "limits"),
+    [
+        (3, ((-1.0, 1.0),) * 3),
+        (5, ((-1.0, 1.0),) * 6),
+        (1, (FREE, FREE)),
+        (2, (FREE, FREE, (0.0, 1.0))),
+        (1, (FREE, (1.0, -1.0))),
+    ],
+)
+def test_chains_that_mean_nothing(order: int, limits: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(ValueError, match="order|limits|least"):
+        Chain(order, limits, (0.0,) * order, (1.0,) * order)
+
+
+def test_the_audit_sees_what_is_wrong() -> None:
+    chain = Chain(2, (FREE, (-1.0, 1.0), (-1.0, 1.0)), (0.0, 0.0), (4.0, 0.0))
+    assert audit(chain, (1.0, -1.0), (2.0, 2.0)).worst == "velocity.max"
+    assert audit(chain, (1.0, 0.0, -1.0), (1.0, 3.0, 1.0)).accepted
+    assert audit(chain, (1.0, 0.0, -1.0), (1.0, 2.0, 1.0)).residual == pytest.approx(0.25)
+    assert not audit(chain, (2.0, 0.0, -2.0), (0.5, 3.5, 0.5)).accepted
+    assert not audit(chain, (1.0, 0.0, -1.0), (1.0, -3.0, 1.0)).accepted

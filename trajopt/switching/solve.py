@@ -1,0 +1,45 @@
+"""The shortest move of a chain of integrators, by the method that its order and its ends call for."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+from trajopt.switching.chain import Arcs, Chain, Unresolved
+from trajopt.switching.general import shortest_general
+from trajopt.switching.low import OutOfRange, refuse_doomed, shortest_low
+from trajopt.switching.snap import between_rests
+
+_OPEN = 1e-9  # relative: a loss that only a wrong structure leaves
+
+
+def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -> Arcs:
+    """The verified arcs of least duration.
+
+    A fourth-order move that holds its greatest velocity needs switches without end; they are cut off where the loss is
+    below 1e-10 of the duration, after ``touches`` touches of the limit at each end, or before two switches come closer
+    than ``min_dwell``; ``bracket`` tells what that costs. Orders one to three do not chatter and ignore both.
+    The bracket is closed but for rounding for orders one to three without active position limits, and for fourth-order
+    moves between rests; elsewhere the structure is that of a coarse program, and the lower bound that of lower orders.
+    Raises Impossible, or Unresolved when no list of arcs could be verified.
+    """
+    if min_dwell < 0 or (touches is not None and touches < 0):
+        raise ValueError("min_dwell and touches must not be negative")
+    refuse_doomed(chain)
+    if chain.start == chain.end:
+        return Arcs((), (), (), (), 0.0, 0.0, 0.0)
+    if chain.order < 4:
+        try:
+            return shortest_low(chain)
+        except OutOfRange:
+            return shortest_general(chain, 0.0, None)
+    if not chain.at_rest:
+        return shortest_general(chain, min_dwell, touches)
+    arcs = between_rests(chain, min_dwell, touches)
+    if arcs.loss > _OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
+        with suppress(Unresolved):
+            other = shortest_general(chain, min_dwell, touches)
+            if other.duration < arcs.duration:
+                lowest = min(max(arcs.lowest, other.lowest), other.duration)
+                return replace(other, lowest=lowest, ordinary=arcs.ordinary)
+    return arcs

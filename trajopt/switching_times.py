@@ -1,0 +1,161 @@
+"""Minimum time of a chain of integrators, exactly: the arcs of `trajopt.switching` as a trajectory with a certificate.
+
+The mesh takes the switching times among its nodes. That no shorter move exists is proven apart from how it was found.
+Up to third order, where the axis can wait at an end: with those nodes the relaxation of `trajopt.outer`, which every
+continuous move satisfies, is infeasible at a duration shorter by a billionth. Fourth order: by the costates of the arcs
+(`trajopt.switching.certificate`). For ends that both move, by enumeration of all extremals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt.attempt import Attempt, Clock
+from trajopt.fields import Limit
+from trajopt.mesh import Floats, Mesh
+from trajopt.model import Claim, Outcome
+from trajopt.outer import is_impossible
+from trajopt.prices import ranked
+from trajopt.problem import DERIVATIVES, FREE, Problem
+from trajopt.rebuild import rebuild
+from trajopt.switching import Arcs, Chain, Impossible, Unresolved, shortest
+from trajopt.transcribe import Setting
+
+_SHORTER: Final = (1e-9, 1e-8, 1e-7, 1e-6)  # relative: the first that is proven impossible bounds the least time
+_STEP: Final = 1e-5  # of a limit, for its price
+_BESIDE: Final = 8  # uniform nodes beside the switches, for the proof
+
+
+def as_chain(problem: Problem) -> Chain | None:
+    """The chain of integrators that a problem of minimum time is; None where it is more than that.
+
+    It takes constant limits on derivatives up to a limited top one, given states at both ends, and a force limit where
+    the force is an acceleration in disguise.
+    """
+    move, limits = problem.move, problem.limits.given()
+    more = move.via or problem.vibration or problem.transcription.scheme != "exact" or "power" in limits
+    timed = move.time == FREE and [term.minimize for term in problem.objective.terms] == ["time"]
+    if more or not timed or any(limit.varies for limit in limits.values()):
+        return None
+    accelerations = _acceleration(problem)
+    states = [state.fixed(problem.order) for state in (move.start, move.end)]
+    if accelerations is None or any(len(state) < problem.order for state in states):
+        return None
+    bounds = [_pair(limits.get(name)) for name in DERIVATIVES[: problem.order + 1]]
+    bounds[2] = accelerations
+    low, high = bounds[-1]
+    if not -inf < low < 0 < high < inf:
+        return None
+    start, end = (tuple(state[i] for i in range(problem.order)) for state in states)
+    return Chain(problem.order, tuple(bounds), start, end)
+
+
+def _pair(limit: Limit | None) -> tuple[float, float]:
+    return (-inf, inf) if limit is None else (limit.lowest, limit.highest)
+
+
+def _acceleration(problem: Problem) -> tuple[float, float] | None:
+    """The acceleration limits, with those that a force limit means; None where it depends on the velocity."""
+    load, way, force = problem.load, problem.one_way, problem.limits.force
+    low, high = _pair(problem.limits.acceleration)
+    if force is None:
+        return low, high
+    if load.viscous or not isinstance(load.inertia, float) or (load.coulomb and not way):
+        return None
+    drag = way * load.coulomb
+    return max(low, (force.lowest - drag) / load.inertia), min(high, (force.highest - drag) / load.inertia)
+
+
+def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:
+    """The shortest move, with a lower bound on its duration and its structure.
+
+    Raises `trajopt.switching.Impossible` and `Unresolved`.
+    """
+    wanted = setting.problem.transcription
+    arcs = shortest(chain, wanted.min_dwell, wanted.touches)
+    fractions = np.array(arcs.switches) / arcs.duration
+    mesh = _with(setting.mesh.fractions, fractions)
+    middles = (mesh.fractions[1:] + mesh.fractions[:-1]) / 2
+    top = np.array(arcs.tops)[np.searchsorted(fractions, middles)]
+    start = np.array([*chain.start])
+    start[0] -= setting.problem.move.start_position or 0.0
+    trajectory = rebuild(setting.problem, mesh, setting.scheme, setting.sizes, arcs.duration, start, top)
+    bound, about = _bound(setting, chain, arcs, clock)
+    notes = {"structure": _structure(arcs, bound), "bounds": about, "prices": _prices(setting.problem, arcs)}
+    return Attempt(Outcome(Claim.OPTIMAL, "switching times"), trajectory, arcs.duration, bound, notes=notes)
+
+
+def _with(uniform: Floats, switches: Floats) -> Mesh:
+    """The uniform nodes with those at the switches; a uniform one within a thousandth of a step of a switch goes."""
+    if not len(switches):
+        return Mesh(uniform)
+    far = np.min(np.abs(uniform[:, None] - switches[None, :]), axis=1) > 1e-3 / (len(uniform) - 1)
+    far[[0, -1]] = True
+    return Mesh(np.unique(np.concatenate([uniform[far], switches])))
+
+
+def _bound(setting: Setting, chain: Chain, arcs: Arcs, clock: Clock) -> tuple[float, str]:
+    """A lower bound on the least duration, and for what moves it holds."""
+    if chain.order == 4:  # chattering: too many switches for the relaxation, but its own multipliers prove it
+        return max(arcs.lowest, 0.0), "every move in continuous time"
+    mesh = _with(np.linspace(0.0, 1.0, _BESIDE + 1), np.array(arcs.switches) / arcs.duration)
+    for share in _SHORTER if setting.problem.can_wait else ():
+        shorter = arcs.duration * (1 - share)
+        move = setting.problem.move.model_copy(update={"time": shorter})
+        problem = setting.problem.model_copy(update={"move": move})
+        if is_impossible(replace(setting, problem=problem, mesh=mesh), shorter, clock):
+            return shorter, "every move in continuous time"
+    return max(arcs.lowest, 0.0), "every move in continuous time, by enumeration of the extremals"
+
+
+def _prices(problem: Problem, arcs: Arcs) -> list[dict[str, Any]]:
+    """What each limit that the arcs run on or touch costs, by two shortest moves beside this one."""
+    found = {}
+    met = {*arcs.active, *(name for _, name in arcs.touches)}
+    for quantity, limit in problem.limits.given().items():
+        known_as = "acceleration" if quantity == "force" else quantity
+        sides = [side for side in ("min", "max") if f"{known_as}.{side}" in met]
+        for name in [quantity] if limit.symmetric and sides else [f"{quantity}.{side}" for side in sides]:
+            now = limit.lowest if name.endswith(".min") else limit.highest
+            step = _STEP * (abs(now) or max(abs(limit.lowest), abs(limit.highest)))
+            times = [_duration(_moved(problem, name, now + way * step), arcs) for way in (1, -1)]
+            per_unit = (times[0] - times[1]) / (2 * step)
+            found[name] = (per_unit, per_unit * now)
+    return ranked(problem, found, arcs.duration)
+
+
+def _moved(problem: Problem, name: str, value: float) -> Problem:
+    """The problem with a limit a little off; not validated, for a boundary state may lie on it."""
+    quantity, _, side = name.partition(".")
+    limit = getattr(problem.limits, quantity)
+    sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
+    limits = problem.limits.model_copy(update={quantity: Limit.model_construct(**sides)})
+    return problem.model_copy(update={"limits": limits})
+
+
+def _duration(problem: Problem, arcs: Arcs) -> float:
+    """The least duration of a neighbouring problem, s."""
+    chain, wanted = as_chain(problem), problem.transcription
+    try:
+        return arcs.duration if chain is None else shortest(chain, wanted.min_dwell, wanted.touches).duration
+    except (Impossible, Unresolved):
+        return arcs.duration
+
+
+def _structure(arcs: Arcs, bound: float) -> dict[str, Any]:
+    """The arcs for the result: when, on which limit; touches; the bracket; what an ordinary S-curve would lose."""
+    ends = [0.0, *arcs.switches, arcs.duration]
+    rows = zip(ends, ends[1:], arcs.active, arcs.tops, strict=False)
+    found: dict[str, Any] = {
+        "arcs": [{"from": a, "to": b, "limit": limit, "top": top} for a, b, limit, top in rows],
+        "touches": [{"time": t, "limit": limit} for t, limit in arcs.touches],
+        "bracket": [bound, arcs.duration],
+    }
+    if arcs.ordinary is not None:
+        found["s_curve"] = {"duration": arcs.ordinary, "loss": arcs.ordinary / arcs.duration - 1}
+        found["chatters"] = arcs.chatters
+    return found
