@@ -136,6 +136,15 @@ def test_a_least_spacing_of_switches_cuts_the_chattering(dwell: float, ends: int
     assert arcs.lowest == pytest.approx(ROWS[0][5], rel=1e-12)
 
 
+def test_short_moves_with_fewer_touches_know_what_they_lose() -> None:
+    chain = between_rests(0.095, *ROWS[1][1:5])
+    none, one = limited(chain, touches=0), limited(chain, touches=1)
+    assert (len(none.touches), len(one.touches)) == (0, 3)
+    assert none.loss == pytest.approx(0.175 / SHORT[4][1] - 1, rel=1e-5)
+    spaced = limited(chain, min_dwell=1e-3)
+    assert spaced.duration == none.duration and spaced.least_dwell >= 1e-3
+
+
 def test_a_spacing_longer_than_every_arc_is_refused() -> None:
     with pytest.raises(Unresolved, match="least spacing"):
         shortest(between_rests(*ROWS[0][:5]), min_dwell=5.0)
@@ -154,6 +163,12 @@ def test_more_touches_towards_the_distance_of_the_first_plateau() -> None:
     counts = [len(arcs.touches) for arcs in found]
     assert counts == sorted(counts) and counts[-1] >= 4
     assert max(arcs.loss for arcs in found) < 1e-9
+
+
+def test_the_s_curve_is_the_shortest_where_its_plateau_begins() -> None:
+    arcs = limited(between_rests(0.08, *ROWS[1][1:5]))
+    assert arcs.duration == pytest.approx(0.16, rel=1e-13) and arcs.loss < 1e-9
+    assert arcs.ordinary == pytest.approx(arcs.duration, rel=1e-13)
 
 
 def test_snap_alone_has_a_closed_form() -> None:

@@ -13,7 +13,7 @@ from tests.conftest import axis, solved
 from tests.reference import closed_forms as known
 
 LIMITS = {"velocity": 0.5, "acceleration": 4.905, "jerk": 98.1}  # Clemen & Rupp 2023, Table I
-FOUND = 1e-9  # relative: how close the search brackets the duration
+FOUND = 2e-7  # relative: how close the search comes, with room to keep the limits between nodes
 
 
 def shortest(distance: float = 0.254, intervals: int = 40, **changes: Any) -> trajopt.Problem:
@@ -120,7 +120,7 @@ def test_search_and_free_step_agree(case: str) -> None:
 
 def test_the_bound_on_the_duration_is_below_and_close() -> None:
     solution = solved(shortest(limits=LIMITS))
-    assert 0 < solution.duration - solution.certificate["lower_bound"] <= 1e-7 * solution.duration
+    assert 0 < solution.duration - solution.certificate["lower_bound"] <= 2e-7 * solution.duration
 
 
 @pytest.mark.parametrize("solver", ["auto", "ipopt"])

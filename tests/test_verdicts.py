@@ -8,6 +8,9 @@ import pytest
 
 import trajopt
 from tests.conftest import axis
+from trajopt.attempt import Clock
+from trajopt.explain import explain
+from trajopt.transcribe import Setting
 from trajopt.verdict import Verdict
 
 
@@ -53,6 +56,34 @@ def test_an_explanation_cut_short_claims_nothing() -> None:
         )
         if "no value of" in text:
             assert "velocity.max" not in text.partition("no value of")[2].partition(" alone")[0]
+
+
+class Impatient(Clock):
+    """A time limit that strikes at the n-th look at the clock."""
+
+    def __init__(self, looks: int) -> None:
+        super().__init__()
+        self.looks = looks
+
+    @property
+    def over(self) -> bool:
+        self.looks -= 1
+        return self.looks < 0
+
+
+@pytest.mark.parametrize("ends", [{}, {"velocity": 0.2}], ids=["at rest", "moving"])
+def test_a_limit_that_strikes_at_any_moment_of_an_explanation_is_no_bug(ends: dict[str, float]) -> None:
+    limits = {"velocity": (0.0, 0.5), "acceleration": 4.905, "jerk": 98.1}
+    given = {"distance": 0.254, "time": 0.5, "limits": limits, "start": ends, "end": ends, "intervals": 12}
+    setting = Setting.of(axis("jerk", "l2", **given))
+    for looks in range(0, 40, 3):
+        assert explain(setting, Impatient(looks))["text"]
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_limit_that_is_none_is_refused(seconds: float) -> None:
+    with pytest.raises(trajopt.BadInput, match="seconds: must be > 0 and finite"):
+        trajopt.solve(axis("jerk", "l2"), seconds=seconds)
 
 
 def test_a_failure_leaves_no_numbers_of_an_earlier_answer(tmp_path: Path) -> None:

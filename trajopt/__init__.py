@@ -15,7 +15,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "load": "trajopt.problem_file",
     "from_dict": "trajopt.problem_file",
-    "solve": "trajopt.solving",
+    "solve": "trajopt.worker",
     "route": "trajopt.routing",
     "synchronise": "trajopt.axes",
     "check": "trajopt.checker",

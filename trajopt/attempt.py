@@ -63,7 +63,7 @@ class Attempt:
         return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
 
 
-ENOUGH: Final = 1e-7  # gap: no further rung of the ladder is climbed
+ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
 
 Goal = Callable[[Transcript], Lowered]
 
@@ -75,12 +75,13 @@ def convex(
     clock: Clock,
     solver: str = "clarabel",
     widen: Sequence[str] = (),
+    widen_size: float = 1.0,
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
     run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate.
 
-    The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable (see
-    `trajopt.transcribe.transcribe`).
+    The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
+    ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
     from trajopt.model_cvxpy import LADDER, RESCUE, ConvexModel
 
@@ -90,7 +91,7 @@ def convex(
             break
         since = perf_counter()
         model = ConvexModel()
-        by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+        by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
         transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
         lowered = goal(transcript)
         model.minimize(lowered.expression)
@@ -109,8 +110,11 @@ def convex(
     return best
 
 
-def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory) -> Attempt:
-    """A local optimum by Ipopt, from a starting trajectory; the duration is free where the problem leaves it free."""
+def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, widen: Sequence[str] = ()) -> Attempt:
+    """A local optimum by Ipopt, from a starting trajectory; the duration is free where the problem leaves it free.
+
+    ``widen`` as for `convex`.
+    """
     from trajopt.model_pyomo import NonconvexModel
 
     since = perf_counter()
@@ -118,7 +122,8 @@ def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory) -> 
     duration: Any = setting.problem.move.fixed_time
     if duration is None:
         duration = _free_duration(setting, model, start.duration)
-    transcript = transcribe(setting, model, duration)
+    by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+    transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
     for x, values in zip(transcript.chain, start.chain, strict=True):
         model.start(x, values)
     lowered = goal(transcript)

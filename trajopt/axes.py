@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from pydantic import ValidationError
 
-from trajopt import solving
+from trajopt import worker
 from trajopt.attempt import smoothest
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Objective, Problem, Term
@@ -15,7 +15,7 @@ from trajopt.solution import Solution
 
 
 def synchronise(
-    problems: Sequence[Problem], seconds: float | None = None, solve: Callable[..., Solution] = solving.solve
+    problems: Sequence[Problem], seconds: float | None = None, solve: Callable[..., Solution] = worker.solve
 ) -> list[Solution]:
     """One solution an axis, all of one duration (s): the least time of the slowest.
 

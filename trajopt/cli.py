@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -46,6 +47,7 @@ def solve(
 
     _refuse_seconds(seconds)
     problem = problem_file.load(source, overrides)
+    _make_folder(output)
     for warning in preflight.warnings(problem):
         print(f"warning: {warning}", file=sys.stderr)
     solution = solve_apart(problem, seconds)
@@ -75,6 +77,7 @@ def synchronise(
     from trajopt.worker import solve_apart
 
     _refuse_seconds(seconds)
+    _make_folder(output)
     solutions = together([problem_file.load(source) for source in sources], seconds, solve_apart)
     if output is not None:
         for k, (source, solution) in enumerate(zip(sources, solutions, strict=True), start=1):
@@ -138,6 +141,15 @@ def problems(as_json: AsJson = False) -> None:
         print(f"{name:{width}}  {p.title}")
 
 
+def _make_folder(output: Path | None) -> None:
+    """Make the output folder and see that it can be written, before anything is solved for it. Raises OSError."""
+    if output is None:
+        return
+    output.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=output):
+        pass
+
+
 def _refuse_seconds(seconds: float | None) -> None:
     if seconds is not None and not 0.1 <= seconds <= 1e6:
         raise BadInput(f"--seconds must be 0.1 to 1e6, got {seconds:g}")
@@ -146,8 +158,12 @@ def _refuse_seconds(seconds: float | None) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line. Every failure is one line on stderr, and an exit code (see `trajopt.verdict`)."""
     words = sys.argv[1:] if arguments is None else arguments
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal without these letters shows others
+            stream.reconfigure(errors="replace")
     try:
         code = app(args=words, prog_name="trajopt", standalone_mode=False)
+        sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):
         _fail("INTERRUPTED", "stopped by the user", 130, words)
     except TyperException as error:
@@ -158,7 +174,9 @@ def main(arguments: list[str] | None = None) -> None:
     except TrajoptError as error:
         _fail("BAD_INPUT" if error.exit_code == 2 else "UNDECIDED", str(error), error.exit_code, words)
     except OSError as error:
-        _fail("UNDECIDED", f"{error.filename or 'output'}: {error.strerror or error}", 4, words)
+        if error.filename is None:  # standard output is gone or full: nothing more can be said there
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        _fail("UNDECIDED", f"{error.filename or 'standard output'}: {error.strerror or error}", 4, words)
     except Exception as error:
         _fail("CRASHED", f"a bug in trajopt: {error!r}; the traceback is in {_keep(error)}", 70, words)
     else:

@@ -20,6 +20,7 @@ from trajopt.solution import Solution
 from trajopt.transcribe import Setting, without
 from trajopt.verdict import Verdict
 
+KEPT: Final = 1e-9  # of a limit: further answers are sought for one that exceeds it by more
 GAP: Final = 1e-6  # relative: a checked answer within it of its lower bound is solved
 _VERDICTS: Final = {Claim.INFEASIBLE: Verdict.IMPOSSIBLE_ON_GRID, Claim.LIMIT: Verdict.LIMIT}
 
@@ -60,14 +61,21 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
 def first_solved(
     setting: Setting, candidates: Iterable[tuple[Attempt, Route]], clock: Clock, local: bool = False
 ) -> Solution:
-    """The conclusion of the first candidate that passes, or of the last."""
-    solution = None
+    """The conclusion of the first candidate that passes and keeps its limits to KEPT; else of the first that passes, or
+    of the last."""
+    best: Solution | None = None
     for attempt, chosen in candidates:
         solution = conclude(setting, chosen, attempt, clock, local)
-        if solution.status.solved or attempt.trajectory is None:
+        if best is None or not best.status.solved or (solution.status.solved and _keeps_limits(solution)):
+            best = solution
+        if attempt.trajectory is None or clock.over or (best.status.solved and _keeps_limits(best)):
             break
-    assert solution is not None
-    return solution
+    assert best is not None
+    return best
+
+
+def _keeps_limits(solution: Solution) -> bool:
+    return bool(solution.audit["excess"] <= KEPT)
 
 
 def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -> Solution:
@@ -85,7 +93,11 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
         elif problem.load.coulomb and problem.limits.force is not None:
             status, explanation = Verdict.UNDECIDED, {}
         clock.charge("explain", since)
+    if status is Verdict.UNDECIDED and clock.over:
+        status = Verdict.LIMIT
     message = explanation["text"][0] if explanation else outcome.raw_status
+    if status is Verdict.LIMIT and clock.over:
+        message = "stopped at the time limit"
     if status is Verdict.UNDECIDED and problem.load.coulomb:
         message += "; the program takes friction at rest for friction in motion"
     return Solution(status, problem, chosen, explanation=explanation, timings=clock.timings(), message=message)

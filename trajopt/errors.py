@@ -9,7 +9,7 @@ class TrajoptError(Exception):
     exit_code = 3
 
 
-class BadInput(TrajoptError):
+class BadInput(TrajoptError, ValueError):
     """The problem as stated cannot be meant: one line naming field, value, unit, allowed range and remedy."""
 
     exit_code = 2

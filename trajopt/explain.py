@@ -8,23 +8,28 @@ millionth.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
+import norms
 from trajopt import units
-from trajopt.attempt import Attempt, Clock, convex
+from trajopt.attempt import Attempt, Clock, convex, nonconvex
 from trajopt.fields import Limit, Table
 from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible
-from trajopt.problem import FREE, Problem
+from trajopt.power import descend, relax
+from trajopt.problem import FREE, Objective, Problem, Term
 from trajopt.scaling import sizes_of
+from trajopt.switching import Chain, Impossible, Unresolved, feasible_durations, shortest
+from trajopt.switching_times import as_chain
 from trajopt.time_search import farthest, feasible_times, minimum_time
-from trajopt.transcribe import Setting, Transcript
+from trajopt.transcribe import Setting, Transcript, without
 
 ROUND: Final = 1e-6  # relative: how far a cure is moved to the feasible side
-_ENOUGH: Final = 1e6  # no limit is widened by more than this many times its own value
 
 
 def explain(setting: Setting, clock: Clock) -> dict[str, Any]:
@@ -71,18 +76,65 @@ def _nonzero(problem: Problem) -> list[str]:
 
 
 def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
-    """The least time, and where the axis cannot wait at an end, every interval of possible times."""
+    """The least time on this mesh and, where its switching times are found, in continuous time; where the axis cannot
+    wait at an end, every interval of possible times."""
     problem = setting.problem
     if problem.move.via or any(limit.varies for limit in problem.limits.given().values()) or _free_ends(problem):
         return {"least_time": None}
-    freed = problem.move.model_copy(update={"time": FREE})
-    free = replace(setting, problem=problem.model_copy(update={"move": freed}))
+    move = problem.move.model_copy(update={"time": FREE})
+    timed = Objective(terms=(Term(minimize="time"),))
+    free = replace(setting, problem=problem.model_copy(update={"move": move, "objective": timed}))
     free = replace(free, sizes=sizes_of(free.problem))
+    chain = as_chain(free.problem)
+    found: dict[str, Any] = {"least_time_continuous": None if chain is None else _shortest(chain)}
     if problem.can_wait:
         attempt = minimum_time(free, clock)
-        return {"least_time": attempt.trajectory.duration * (1 + ROUND) if attempt.trajectory else None}
-    possible = feasible_times(free, clock)
-    return {"least_time": possible[0][0] if possible else None, "possible_times": possible}
+        return found | {"least_time": attempt.trajectory.duration * (1 + ROUND) if attempt.trajectory else None}
+    near = [] if chain is None or chain.order > 3 else _borders(chain)
+    possible = feasible_times(free, clock, near)
+    return found | {"least_time": possible[0][0] if possible else None, "possible_times": possible}
+
+
+def _shortest(chain: Chain) -> float | None:
+    try:
+        return shortest(chain).duration
+    except (Impossible, Unresolved):
+        return None
+
+
+def _borders(chain: Chain) -> list[float]:
+    """The finite borders of the durations that are possible in continuous time, s."""
+    try:
+        return [t for interval in feasible_durations(chain) for t in interval if np.isfinite(t)]
+    except (Impossible, Unresolved):
+        return []
+
+
+def explain_power(setting: Setting, clock: Clock) -> dict[str, Any] | None:
+    """Why a power limit cannot be kept, where the cone bound of the least peak power lies above it; None elsewhere."""
+    problem = setting.problem
+    limit = problem.limits.power
+    if limit is None or problem.move.fixed_time is None:
+        return None
+    peak = Objective(terms=(Term(minimize="power", norm=norms.Linf()),))
+    free = without(setting, ["power"])
+    free = replace(free, problem=free.problem.model_copy(update={"objective": peak}))
+    relaxed, most = relax(free, clock), max(abs(limit.lowest), abs(limit.highest))
+    if relaxed.trajectory is None or relaxed.bound <= most * (1 + ROUND):
+        return None
+    start = descend(free, relaxed.trajectory, clock).trajectory
+    found: dict[str, Any] = {"continuous": False, "least_peak_power": {"bound": relaxed.bound}}
+    text = [
+        f"limits.power allows {most:g} W: within the other limits every move on this mesh of"
+        f" {problem.transcription.intervals} intervals needs {relaxed.bound:.6g} W at its peak"
+    ]
+    sides = [side for side in ("power.min", "power.max") if getattr(limit, side.partition(".")[2]) is not None]
+    best = None if start is None else nonconvex(setting, _least_widening, clock, start, widen=sides)
+    if best is not None and best.trajectory is not None and limit.symmetric:
+        enough = most * (1 + best.value) * (1 + ROUND)
+        found["limits"] = {"power": {"now": most, "unit": "W", "value": enough, "never": False}}
+        text.append(f"power {most:g} -> {enough:.7g} W alone is enough")
+    return found | {"text": text}
 
 
 def _free_ends(problem: Problem) -> bool:
@@ -103,30 +155,32 @@ def _reachable(setting: Setting, clock: Clock) -> list[float] | None:
     return [low + inwards, high - inwards] if low + inwards < high - inwards else None
 
 
-def _widening(setting: Setting, duration: float, sides: list[str], clock: Clock) -> Attempt:
-    """The least widening of some sides, together, that makes the move possible."""
+def _widening(setting: Setting, duration: float, sides: list[str], clock: Clock, size: float = 1.0) -> Attempt:
+    """The least widening of some sides, together, that makes the move possible; ``size``: how much it may be."""
+    return convex(setting, duration, partial(_least_widening, size=size), clock, widen=sides, widen_size=size)
 
-    def goal(transcript: Transcript) -> Lowered:
-        return Lowered(next(iter(transcript.widen.values())), 1.0, None)
 
-    return convex(setting, duration, goal, clock, widen=sides)
+def _least_widening(transcript: Transcript, size: float = 1.0) -> Lowered:
+    return Lowered(next(iter(transcript.widen.values())) * (1 / size), size, None)
 
 
 def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock: Clock) -> dict[str, Any]:
     """What one limit would have to be, all others as they are; ``value`` None where no value is enough (``never``, by a
     certificate) or none was found in the time."""
-    attempt = _widening(setting, duration, widen, clock)
     quantity, _, side = name.partition(".")
     limit = getattr(setting.problem.limits, quantity)
     now = limit.lowest if side == "min" else limit.highest
+    without_it = without(setting, [quantity]).problem
+    roomy = replace(setting, sizes=sizes_of(without_it, setting.problem.order))
+    size = roomy.sizes.of(quantity)
+    attempt = _widening(roomy, duration, widen, clock, max(size / abs(now), 1.0) if now else 1.0)
     unit = units.kinds(setting.problem.rotary)[quantity].unit
     known: dict[str, Any] = {"now": now, "unit": unit, "varies": limit.varies, "value": None, "factor": None}
-    never = attempt.outcome.claim is Claim.INFEASIBLE or attempt.bound > _ENOUGH
-    if never or attempt.trajectory is None:
-        return known | {"never": never}
-    known["never"] = False
+    known["never"] = attempt.outcome.claim is Claim.INFEASIBLE
+    if attempt.trajectory is None:
+        return known
     by = attempt.value * (1 + ROUND) + ROUND * 1e-3
-    own = abs(now) if now else setting.sizes.of(quantity)
+    own = abs(now) if now else size
     return known | {"value": now + by * own * (-1 if side == "min" else 1), "factor": 1 + by if now else None}
 
 
@@ -143,28 +197,44 @@ def _conflict(together: Attempt, duration: float) -> list[dict[str, Any]]:
 
 
 def _sentences(problem: Problem, found: dict[str, Any]) -> list[str]:
-    move = problem.move
+    move, intervals = problem.move, problem.transcription.intervals
     text = [
         f"in {move.fixed_time:.6g} s this move is impossible within the limits"
-        + (" (in continuous time: no mesh helps)" if found["continuous"] else " on this mesh")
+        + (" (in continuous time: no mesh helps)" if found["continuous"] else f" on this mesh of {intervals} intervals")
     ]
-    if found["least_time"] is not None:
-        text.append(f"the least time is {found['least_time']:.7g} s")
-    for (_, above), (below, _) in zip(
-        found.get("possible_times", []), found.get("possible_times", [])[1:], strict=False
-    ):
-        text.append(f"times from {above:.6g} s to {below:.6g} s are blocked")
+    text += [*_time_text(found, intervals), *_blocked_text(found.get("possible_times", []))]
     if found["reachable"] is not None:
         text.append(_reach_text(problem, *found["reachable"]))
-    enough = [(n, c) for n, c in found["limits"].items() if c["value"] is not None and not c["varies"]]
-    text += [f"{n} {c['now']:g} -> {c['value']:.7g} {c['unit']} alone is enough" for n, c in enough]
-    never = [name for name, cure in found["limits"].items() if cure["never"]]
+    for name, cure in found["limits"].items():
+        shown = problem.shown(name)
+        if cure["value"] is not None and cure["varies"]:
+            text.append(f"{shown} at all times {cure['factor']:.7g} times as wide alone is enough")
+        elif cure["value"] is not None:
+            text.append(f"{shown} {cure['now']:g} -> {cure['value']:.7g} {cure['unit']} alone is enough")
+    never = [problem.shown(name) for name, cure in found["limits"].items() if cure["never"]]
     if never:
         text.append(f"no value of {' or '.join(never)} alone is enough")
     if found["all_limits_factor"]:
         text.append(f"or all limits together by {100 * (found['all_limits_factor'] - 1):.4g} %")
-    text += [f"{c['limit']} stands in the way from {c['from']:.4g} s to {c['to']:.4g} s" for c in found["conflict"]]
+    for c in found["conflict"]:
+        text.append(f"{problem.shown(c['limit'])} stands in the way from {c['from']:.4g} s to {c['to']:.4g} s")
     return text
+
+
+def _time_text(found: dict[str, Any], intervals: int) -> list[str]:
+    """The least time on the mesh, and how far it could fall on finer ones."""
+    least, ideal = found["least_time"], found.get("least_time_continuous")
+    if least is None:
+        return []
+    finer = f" on this mesh of {intervals} intervals, {ideal:.7g} s in continuous time" if ideal is not None else ""
+    return [f"the least time is {least:.7g} s{finer}"]
+
+
+def _blocked_text(possible: list[tuple[float, float | None]]) -> list[str]:
+    """The times in which a move with moving ends is impossible, above the least one."""
+    text = [f"times from {a:.6g} s to {b:.6g} s are blocked" for (_, a), (b, _) in pairwise(possible)]
+    last = possible[-1][1] if possible else None
+    return text if last is None else [*text, f"times above {last:.6g} s are blocked"]
 
 
 def _reach_text(problem: Problem, low: float, high: float) -> str:

@@ -9,16 +9,27 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, ValidationInfo
 
 from trajopt import units
+from trajopt.errors import BadInput
 from trajopt.units import shown
 
 LONGEST_TABLE: Final = 10_000
 
 
 class Section(BaseModel):
+    """A frozen part of a problem. Made in code from what cannot be meant, it raises BadInput in one line."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            from trajopt.problem_file import explain
+
+            raise BadInput(explain(error, type(self))) from None
 
 
 def si(value: Any, kind: str, info: ValidationInfo) -> float:

@@ -28,12 +28,41 @@ def refuse_contradictions(problem: Problem) -> None:
 
 def warnings(problem: Problem) -> list[str]:
     """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk."""
-    return [*_wrong_units(problem), *_coarse(problem)]
+    return [*_clamped(problem), *_wrong_units(problem), *_coarse(problem), *_heavy(problem)]
+
+
+def _clamped(problem: Problem) -> list[str]:
+    """Boundary states that lie outside a limit by a rounding, and are taken as on it."""
+    found = []
+    for where, state in _states(problem):
+        for i, value in state.fixed(problem.order, None).items():
+            limit = getattr(problem.limits, DERIVATIVES[i])
+            if limit is None:
+                continue
+            low, high = at_time(limit, _when(problem, where, state))
+            if not low <= value <= high:
+                side = "min" if value < low else "max"
+                name = f"{where}.{DERIVATIVES[i]}"
+                found.append(f"{name}: {value!r} is outside its limit by a rounding; taken as its {side}")
+    return found
+
+
+def _heavy(problem: Problem) -> list[str]:
+    count = problem.transcription.intervals
+    if count <= 20_000:
+        return []
+    return [f"transcription.intervals: {count} take about {15e-6 * count:.2g} GB of memory; 200 are usual"]
 
 
 def _states(problem: Problem) -> list[tuple[str, State]]:
     via = [(f"move.via[{i}]", state) for i, state in enumerate(problem.move.via)]
     return [("move.start", problem.move.start), ("move.end", problem.move.end), *via]
+
+
+def _when(problem: Problem, where: str, state: State) -> float:
+    """The time of a boundary or via state, s; of a free end zero."""
+    times = {"move.start": 0.0, "move.end": problem.move.fixed_time or 0.0}
+    return times.get(where, float(getattr(state, "time", 0.0)))
 
 
 def _time(problem: Problem) -> None:
@@ -48,6 +77,10 @@ def _time(problem: Problem) -> None:
         raise ValueError('move.time: "free" needs a time term in the objective, or a range such as ["0.5 s", "2 s"]')
     if fixed:
         return
+    if problem.move.time == "free" and not any(name != "position" for name in problem.limits.given()):
+        only = len(problem.objective.terms) == 1
+        if only:
+            raise ValueError('limits: nothing bounds the move: least time needs one such as acceleration = "5 m/s^2"')
     if problem.move.time == "free" and _stays(problem):
         raise ValueError("move.end: the move ends where it starts, at rest: it takes no time; give move.time")
     if any(limit.varies for limit in problem.limits.given().values()) or problem.move.via:
@@ -102,7 +135,7 @@ def _vibration(problem: Problem) -> None:
 
 
 def _within_limits(problem: Problem, where: str, state: State) -> None:
-    time = {"move.start": 0.0, "move.end": problem.move.fixed_time or 0.0}.get(where, getattr(state, "time", 0.0))
+    time = _when(problem, where, state)
     default = None if where.startswith("move.via") else 0.0
     for i, value in state.fixed(problem.order, default).items():
         name = DERIVATIVES[i]

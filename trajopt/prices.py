@@ -89,8 +89,8 @@ def _is_zero(problem: Problem, name: str) -> bool:
     return bool(side) and getattr(getattr(problem.limits, quantity), side) == 0.0
 
 
-def sentence(row: Mapping[str, Any], label: str) -> str:
+def sentence(row: Mapping[str, Any], name: str, label: str) -> str:
     """``+1 % jerk: -0.42 % peak power``."""
     if row["per_percent"] is None:
-        return f"{row['name']}: {row['per_unit']:+.3g} {label} per {row['unit']}"
-    return f"+1 % {row['name']}: {100 * row['per_percent']:+.3g} % {label}"
+        return f"{name}: {row['per_unit']:+.3g} {label} per {row['unit']}"
+    return f"+1 % {name}: {100 * row['per_percent']:+.3g} % {label}"

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
 
 import norms
 from trajopt import units
@@ -304,6 +304,12 @@ class Transcription(Section):
     touches: Annotated[int | None, BeforeValidator(_touches)] = None
 
 
+def _printable(text: str) -> str:
+    if not text.isprintable() or len(text) > 1000:
+        raise ValueError(f"must be one line of printable text, at most 1000 characters, got {shown(text)}")
+    return text
+
+
 class Problem(Section):
     """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy."""
 
@@ -313,9 +319,9 @@ class Problem(Section):
     load: Load = Load()
     vibration: tuple[Vibration, ...] = ()
     transcription: Transcription = Transcription()
-    title: str = ""
-    source: str = ""
-    moral: str = ""
+    title: Annotated[str, AfterValidator(_printable)] = ""
+    source: Annotated[str, AfterValidator(_printable)] = ""
+    moral: Annotated[str, AfterValidator(_printable)] = ""
     rotary: Annotated[bool, Field(strict=True)] = False
 
     @model_validator(mode="after")
@@ -358,6 +364,10 @@ class Problem(Section):
     def replace(self, **sections: Any) -> Problem:
         """A copy with sections replaced, validated again."""
         return Problem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
+
+    def shown(self, name: str) -> str:
+        """The name of a quantity or limit as people of this axis say it: torque on a rotary one."""
+        return name.replace("force", "torque") if self.rotary else name
 
     def with_limit(self, name: str, value: float) -> Problem:
         """A copy with one limit (``jerk``, plus-minus) or one side of it (``velocity.max``) set to a value, SI."""

@@ -235,19 +235,19 @@ def _dimension(text: Any) -> units.Dimension:
         return (0, 0, 0, 0, 0)
 
 
-def explain(error: ValidationError) -> str:
-    """The first fault of a validation as one line: the field, what is wrong, what would be right."""
+def explain(error: ValidationError, root: type[BaseModel] = p.Problem) -> str:
+    """The first fault of a validation of ``root`` as one line: the field, what is wrong, what would be right."""
     faults = error.errors(include_url=False)
     first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
     field = _dotted(first["loc"])
     kind, got = first["type"], units.shown(first["input"])
     if kind == "extra_forbidden":
-        return f"{field}: unknown key{_meant(first['loc'])}"
+        return f"{field}: unknown key{_meant(first['loc'], root)}"
     if kind == "missing":
         known = ".".join(str(part) for part in first["loc"] if isinstance(part, str))
         return f"{field}: is missing; {_EXAMPLES.get(known, 'write it')}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{field}: must be a section with keys {', '.join(_keys(first['loc']))}, got {got}"
+        return f"{field}: must be a section with keys {', '.join(_keys(first['loc'], root))}, got {got}"
     if kind == "tuple_type":
         return f"{field}: must be a list of sections such as {_LISTS.get(str(first['loc'][-1]), '[...]')}, got {got}"
     if kind == "literal_error":
@@ -263,11 +263,12 @@ def explain(error: ValidationError) -> str:
     return f"{field}{'.' if below else ': '}{message}" if field else message
 
 
-def _meant(loc: Sequence[int | str]) -> str:
+def _meant(loc: Sequence[int | str], root: type[BaseModel]) -> str:
     """A hint at the key meant: one misspelt, or one of another section."""
-    key, known = str(loc[-1]), _keys(loc[:-1])
+    key, known = str(loc[-1]), _keys(loc[:-1], root)
     hint = nearest(key, known)
-    homes = [section for section in ("move", "limits", "load", "objective", "transcription") if key in _keys([section])]
+    sections = ("move", "limits", "load", "objective", "transcription") if root is p.Problem else ()
+    homes = [section for section in sections if key in _keys([section], root)]
     return f"; it belongs in [{homes[0]}]" if homes and len(loc) <= 2 else hint
 
 
@@ -292,9 +293,9 @@ def _as_written(message: str, data: dict[str, Any]) -> str:
     return field + colon + rest
 
 
-def _keys(loc: Sequence[int | str]) -> list[str]:
-    """The keys known at a place of the problem, with the names that files may use for them."""
-    model: Any = p.Problem
+def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
+    """The keys known at a place of ``root``, with the names that files may use for them."""
+    model: Any = root
     for part in loc:
         if isinstance(part, int):
             continue

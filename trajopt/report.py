@@ -19,9 +19,10 @@ _ROWS = ("velocity", "acceleration", "jerk", "snap", "force", "power")
 
 def print_solution(solution: Solution) -> None:
     """Verdict, objective, duration, peaks and RMS with units, certificate, and who solved it and why."""
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     title = solution.problem.title
-    console.print(f"[bold]{solution.status.value}[/]" + (f"  {title}" if title else ""))
+    console.print(solution.status.value, style="bold", end="")
+    console.print(f"  {title}" if title else "")
     if not solution.status.solved:
         for line in solution.explanation.get("text") or [solution.message or solution.status.advice]:
             console.print(f"  {line}")
@@ -32,7 +33,7 @@ def print_solution(solution: Solution) -> None:
     console.print(_table(solution))
     console.print(certificate_text(solution))
     for row in solution.prices[:3]:
-        console.print(f"  {sentence(row, objective_label(solution))}")
+        console.print(f"  {sentence(row, solution.problem.shown(row['name']), objective_label(solution))}")
     for line in _structure_text(solution.structure):
         console.print(f"  {line}")
     for row in solution.comparison():
@@ -76,7 +77,7 @@ def _comparison_text(row: Mapping[str, Any]) -> str:
 def objective_text(solution: Solution) -> str:
     """``power linf = 1.68200675``: what was minimised and its value, with its unit where it is a single signal."""
     terms = solution.problem.objective.terms
-    text = " + ".join((f"{t.weight:g} × " if len(terms) > 1 else "") + t.label for t in terms)
+    text = " + ".join((f"{t.weight:g} × " if len(terms) > 1 else "") + solution.problem.shown(t.label) for t in terms)
     kind = units.kinds(solution.problem.rotary)[terms[0].minimize]
     pure = len(terms) == 1 and (terms[0].norm is None or terms[0].norm.name in ("l2", "linf"))
     return f"{text} = {solution.objective:.9g}" + (f" {kind.unit}" if pure else "")
@@ -100,7 +101,7 @@ def _between_nodes(solution: Solution) -> str | None:
 def objective_label(solution: Solution) -> str:
     """``power linf``, or ``objective`` for a weighted sum."""
     terms = solution.problem.objective.terms
-    return terms[0].label if len(terms) == 1 else "objective"
+    return solution.problem.shown(terms[0].label) if len(terms) == 1 else "objective"
 
 
 def certificate_text(solution: Solution) -> str:

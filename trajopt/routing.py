@@ -20,7 +20,7 @@ class Route:
     solver: str
     reason: str
     tie_break: str = ""  # what a second solve did where the optimum may not be unique
-    unique: bool = True  # whether the second solve found the profile where the first had it
+    unique: bool | None = None  # whether the optimum determines the profile; None where that is not known
 
     def because(self, reason: str) -> Route:
         """The same route for another reason."""

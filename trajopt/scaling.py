@@ -34,13 +34,13 @@ class Sizes:
         ]
 
 
-def sizes_of(problem: Problem) -> Sizes:
+def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
     """The sizes of a problem: min(limit, what the stroke needs), but never below a boundary value.
 
     The stroke needs 4 D/T, 16 D/T², 128 D/T³, 1024 D/T⁴ at most when it is comfortably feasible. A limit also bounds
     what lies below it, by what can be gained in the duration.
     """
-    order = problem.order
+    order = order or problem.order
     duration = problem.move.fixed_time or _free_duration(problem)
     stroke = _stroke(problem, duration)
     derivative = [stroke]

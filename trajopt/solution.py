@@ -22,6 +22,18 @@ if TYPE_CHECKING:
 FORMAT = "trajopt result 1"
 
 
+class Frozen(dict[str, Any]):
+    """A mapping that is not changed once made."""
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("a solution is frozen; copy it to a dict first")
+
+    __setitem__ = __delitem__ = update = pop = popitem = clear = setdefault = __ior__ = _refuse
+
+    def __reduce__(self) -> Any:
+        return Frozen, (dict(self),)
+
+
 @dataclass(frozen=True)
 class Solution:
     """What `trajopt.solve` returns. Without a checked trajectory (``status.solved`` is False) it holds no numbers.
@@ -46,6 +58,11 @@ class Solution:
     timings: Mapping[str, float] = field(default_factory=dict)
     trajectory: Trajectory | None = None
     message: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("metrics", "certificate", "audit", "explanation", "structure", "timings"):
+            object.__setattr__(self, name, Frozen(getattr(self, name)))
+        object.__setattr__(self, "prices", tuple(Frozen(row) for row in self.prices))
 
     def _moved(self) -> Trajectory:
         if self.trajectory is None:

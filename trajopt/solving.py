@@ -11,6 +11,7 @@ import numpy as np
 import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
 from trajopt.conclude import conclude, first_solved
+from trajopt.explain import explain_power
 from trajopt.model import Claim, Outcome
 from trajopt.power import descend, linearised, relax
 from trajopt.prices import prices
@@ -23,16 +24,15 @@ from trajopt.switching_times import as_chain, fastest
 from trajopt.ties import break_tie, tied_route
 from trajopt.time_search import minimum_time
 from trajopt.trajectory import Trajectory
-from trajopt.transcribe import Setting, prescribed, without
+from trajopt.transcribe import Setting, drawn_in, prescribed, without
 from trajopt.verdict import Verdict
+
+_DRAWN = 3e-9  # of a limit
+_LATER = 1e-7  # of a least time
 
 
 def solve(problem: Problem, seconds: float | None = None) -> Solution:
-    """Solve, check and certify; ``seconds`` limits the wall time.
-
-    Returns a Solution in every case; look at ``status``. Raises BadInput when the solver asked for cannot take the
-    problem, MissingSolver when it is not installed, InternalError when a bound exceeds a checked answer.
-    """
+    """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only."""
     clock = Clock(seconds)
     chosen = route(problem)
     setting = Setting.of(problem)
@@ -55,7 +55,8 @@ def solve(problem: Problem, seconds: float | None = None) -> Solution:
         solution, attempt = _convex(setting, lean, chosen, clock)
     else:
         solution, attempt = _by_cones(setting, lean, chosen, clock)
-    if solution.status.solved or lean is setting or attempt.trajectory is None:
+    ended = attempt.trajectory is None and attempt.outcome.claim in (Claim.INFEASIBLE, Claim.LIMIT)
+    if solution.status.solved or lean is setting or ended:
         return solution
     return _with_all_limits(setting, lean, attempt, clock)
 
@@ -110,11 +111,15 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
 
 
 def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Clock) -> Iterator[tuple[Attempt, Route]]:
-    """The tie-broken answer, the first one, and where neither passes what the rungs make of it that were not needed."""
+    """The tie-broken answer and the first one; where neither passes, or a limit is exceeded by rounding, the answer
+    with the limits drawn in a little, and what the rungs make of it that were not needed."""
     yield break_tie(lean, first, chosen, clock)
     yield first, chosen
     if first.trajectory is None or first.gap > ENOUGH or chosen.solver != "clarabel":
         return
+    inner = convex(drawn_in(lean, _DRAWN), first.trajectory.duration, to(lean.problem.objective), clock)
+    if inner.trajectory is not None:
+        yield replace(inner, bound=first.bound, notes=first.notes), chosen
     from trajopt.model_cvxpy import LADDER
 
     for rung in LADDER[1:]:
@@ -135,6 +140,11 @@ def _shortest(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> t
         if smooth.trajectory is not None:
             tied = replace(attempt, trajectory=replace(smooth.trajectory, problem=lean.problem))
             candidates.insert(0, (tied, tied_route(chosen, lean, attempt, tied, "time")))
+        later = duration * (1 + _LATER)  # off the edge, where there is room to keep the limits to the last digit
+        inner = convex(drawn_in(at_time, _DRAWN), later, to(smoothest(lean.problem)), clock)
+        if inner.trajectory is not None:
+            late = replace(attempt, trajectory=replace(inner.trajectory, problem=lean.problem), value=later)
+            candidates.insert(1, (late, candidates[0][1]))
     return first_solved(setting, candidates, clock), attempt
 
 
@@ -151,7 +161,8 @@ def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> t
         answer = replace(answer, bound=relaxed.bound)
     else:
         at_answer = linearised(lean, answer.trajectory)
-        answer = replace(_priced(at_answer, answer, clock), bound=relaxed.bound)
+        notes = answer.notes | {"starts": 1, "agreed": 1}
+        answer = replace(_priced(at_answer, replace(answer, notes=notes), clock), bound=relaxed.bound)
         candidates.append(break_tie(at_answer, answer, chosen, clock))
     return first_solved(setting, [*candidates, (answer, chosen)], clock, local=True), answer
 
@@ -161,6 +172,10 @@ def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: C
     limits = ", ".join(nonaffine_limits(setting.problem))
     chosen = Route("pyomo", "ipopt", f"the {limits} limit is active, and nonconvex")
     local = _from_several_starts(setting, lean, clock)
+    if local.trajectory is None and has_power_bound(setting.problem) and (found := explain_power(setting, clock)):
+        text, timings = found["text"][0], clock.timings()
+        status = Verdict.IMPOSSIBLE_ON_GRID
+        return Solution(status, setting.problem, chosen, explanation=found, timings=timings, message=text)
     bound = max(attempt.bound, relax(setting, clock).bound if has_power_bound(setting.problem) else -np.inf)
     return conclude(setting, chosen, replace(local, bound=bound), clock, local=True)
 
@@ -169,6 +184,11 @@ def _local(setting: Setting, chosen: Route, clock: Clock) -> Solution:
     """Ipopt from several moves within the limits that are convex; if there is none, the move is impossible."""
     problem = setting.problem
     answer = _from_several_starts(setting, without(setting, nonaffine_limits(problem)), clock)
+    if answer.trajectory is None and isinstance(problem.move.time, tuple) and problem.can_wait:
+        kinematic = without(setting, nonaffine_limits(problem))
+        longest = convex(kinematic, problem.move.time[1], to(smoothest(problem)), clock)
+        if longest.outcome.claim is Claim.INFEASIBLE:  # and then so is every shorter time
+            answer = longest
     bounded = has_power_bound(problem) or (_is_affine(problem) and not nonaffine_limits(problem))
     if answer.trajectory is not None and bounded and problem.move.fixed_time is not None:
         answer = replace(answer, bound=relax(setting, clock).bound)

@@ -19,8 +19,10 @@ HELD: Final = (1e-9, 1e-8)  # relative: how closely the second solve holds the o
 
 def break_tie(setting: Setting, attempt: Attempt, chosen: Route, clock: Clock) -> tuple[Attempt, Route]:
     """The smoothest of the optima, the same on every machine, where the profile is not determined; else the attempt."""
-    if attempt.trajectory is None or _determines_profile(setting.problem):
+    if attempt.trajectory is None:
         return attempt, chosen
+    if _determines_profile(setting.problem):
+        return attempt, replace(chosen, unique=True)
     for share in HELD:
         second = _smoothest_optimum(setting, attempt, share, clock)
         if second.trajectory is not None and _costs_no_more(setting, second.trajectory, attempt, 2 * share):

@@ -33,6 +33,14 @@ class Trajectory:
     origin: float
     chain: tuple[Floats, ...]
 
+    def __post_init__(self) -> None:
+        for values in self.chain:
+            values.flags.writeable = False
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
     @property
     def order(self) -> int:
         """Number of the top derivative."""

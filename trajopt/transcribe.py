@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from trajopt import vibration
-from trajopt.fields import Limit
+from trajopt.fields import Limit, Table
 from trajopt.mesh import Floats, Mesh, mesh_for
 from trajopt.model import own_size
 from trajopt.preflight import at_time
@@ -44,6 +44,26 @@ def without(setting: Setting, names: Sequence[str]) -> Setting:
         return setting
     limits = setting.problem.limits.model_copy(update=dict.fromkeys(names))
     return replace(setting, problem=setting.problem.model_copy(update={"limits": limits}))
+
+
+def drawn_in(setting: Setting, share: float) -> Setting:
+    """The setting with every constant limit drawn in by a share of itself, but not past a prescribed state."""
+    move = setting.problem.move
+    states = [state.fixed(setting.problem.order, None) for state in (move.start, move.end, *move.via)]
+
+    def side(name: str, bound: float | Table | None, sign: float) -> float | Table | None:
+        if not isinstance(bound, float) or name == "position":
+            return bound
+        i = DERIVATIVES.index(name) if name in DERIVATIVES else -1
+        given = [sign * state[i] for state in states if i in state]
+        return sign * max(sign * bound - share * abs(bound), max(given, default=-np.inf))
+
+    limits = {
+        name: limit.model_copy(update={"min": side(name, limit.min, -1.0), "max": side(name, limit.max, 1.0)})
+        for name, limit in setting.problem.limits.given().items()
+    }
+    problem = setting.problem
+    return replace(setting, problem=problem.model_copy(update={"limits": problem.limits.model_copy(update=limits)}))
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,35 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import threading
 from multiprocessing.connection import Connection
 from typing import Any
 
+from trajopt.errors import BadInput
 from trajopt.problem import Problem
 from trajopt.routing import route
 from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
 GRACE = 0.5  # s beyond the limit that a solver gets to stop by itself
+
+
+def solve(problem: Problem, seconds: float | None = None) -> Solution:
+    """Solve, check and certify; ``seconds`` limits the wall time, by solving in a process that can be ended.
+
+    Returns a Solution in every case; look at ``status``. Raises BadInput for a limit that is no positive time and when
+    the solver asked for cannot take the problem, MissingSolver when it is not installed, InternalError when a bound
+    exceeds a checked answer.
+    """
+    from trajopt.solving import solve
+
+    if seconds is None:
+        return solve(problem)
+    if not 0 < seconds < float("inf"):
+        raise BadInput(f"seconds: must be > 0 and finite, got {seconds!r}; leave it out for no limit")
+    if multiprocessing.current_process().daemon:  # which may have no child of its own
+        return solve(problem, seconds)
+    return solve_apart(problem, seconds)
 
 
 def solve_apart(problem: Problem, seconds: float | None = None) -> Solution:
@@ -28,6 +48,7 @@ def solve_apart(problem: Problem, seconds: float | None = None) -> Solution:
     child = context.Process(target=_work, args=(sender, problem, seconds), daemon=True)
     child.start()
     sender.close()
+    before = _end_with_us()
     try:
         if receiver.poll(None if seconds is None else seconds + GRACE):
             answer = receiver.recv()
@@ -39,14 +60,28 @@ def solve_apart(problem: Problem, seconds: float | None = None) -> Solution:
         return _ended(problem, Verdict.CRASHED, f"the solver process ended with code {child.exitcode}")
     finally:
         child.kill()
+        if before is not None:
+            signal.signal(signal.SIGTERM, before)
     if isinstance(answer, BaseException):
         raise answer
     assert isinstance(answer, Solution)
     return answer
 
 
+def _end_with_us() -> Any:
+    """Have SIGTERM unwind us, so that the child is ended, too; returns the handler to restore, None off main."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+
+    def unwind(*_: Any) -> None:
+        raise SystemExit(128 + signal.SIGTERM)
+
+    return signal.signal(signal.SIGTERM, unwind)
+
+
 def _work(sender: Connection, problem: Problem, seconds: float | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     answer: Any
     try:
         from trajopt.solving import solve

@@ -1,0 +1,104 @@
+"""A mass moved from rest to rest under a jerk limit, over speed: y(v) = a²/2 has |dy/dv| = |j|.
+
+Between rest and the peak speed y starts and ends at zero, rises and falls by at most J per unit of speed, and lies
+below A²/2 and, for a power limit P, below P²/(2 m² v²). The largest such y, at every speed, makes each ramp as short
+and as long-reaching as it can be; whatever a move does, its ramps lie below it. That proves the minima of ``power``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from math import inf, isfinite, sqrt
+from typing import Final
+
+import numpy as np
+
+from trajopt.velocity_domain.motor import Floats
+
+_NODES: Final = 48
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A mass (kg), its stroke (m, > 0) and the duration (s), with limits of speed, acceleration, deceleration (None: as
+    the acceleration) and jerk, SI. Speed is never negative; the acceleration is zero at both ends under a jerk limit.
+
+    Raises ValueError for values that are not positive.
+    """
+
+    mass: float
+    distance: float
+    duration: float
+    velocity: float = inf
+    acceleration: float = inf
+    deceleration: float | None = None
+    jerk: float = inf
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "distance", "duration"):
+            if not (isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise ValueError(f"the {name} must be positive and finite: one-way moves forwards, from rest to rest")
+        for name in ("velocity", "acceleration", "deceleration", "jerk"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise ValueError(f"the limit of {name} must be positive, not {value:g}")
+
+    @property
+    def ramps(self) -> tuple[float, float]:
+        """The limits of acceleration on the way up and on the way down."""
+        return self.acceleration, self.acceleration if self.deceleration is None else self.deceleration
+
+    def quickest(self, peak: float, power: float = inf) -> tuple[float, float]:
+        """(time, ∫(peak - v) dt) of the shortest way up to a peak speed and down again within a power limit."""
+        if peak == 0:
+            return 0.0, 0.0
+        parts = [self._ramp(peak, power, limit) for limit in self.ramps]
+        return sum(p[0] for p in parts), sum(p[1] for p in parts)
+
+    def _ramp(self, peak: float, power: float, acceleration: float) -> tuple[float, float]:
+        steep, cap = self.jerk, (power / self.mass) ** 2 / 2
+        tangent = (2 * cap / steep) ** (1 / 3) if isfinite(cap) and isfinite(steep) else 0.0
+
+        def height(v: Floats, below: Floats) -> Floats:
+            """y: the cap is left along its tangent of slope -J, where it is steeper."""
+            capped = np.where(v < tangent, steep * (1.5 * tangent - v), cap / v**2) if isfinite(cap) else inf
+            sides = np.minimum(v, below) * steep if isfinite(steep) else inf
+            return np.minimum(np.minimum(capped, sides), acceleration**2 / 2) + 0 * v
+
+        return over_speed(height, self._edges(peak, cap, tangent, acceleration), peak)
+
+    def _edges(self, peak: float, cap: float, tangent: float, acceleration: float) -> list[float]:
+        """Every speed at which one bound of y may take over from another."""
+        found = [peak / 2, tangent, 0.75 * tangent]
+        if isfinite(acceleration):
+            rise = acceleration**2 / (2 * self.jerk)
+            found += [rise, peak - rise, 1.5 * tangent - rise, sqrt(2 * cap) / acceleration]
+        if isfinite(cap) and isfinite(self.jerk):
+            roots = np.roots([-self.jerk, self.jerk * peak, 0.0, -cap])
+            found += [float(r.real) for r in roots if abs(r.imag) < 1e-9 * peak]
+        return [0.0, *sorted(v for v in found if 0 < v < peak), peak]
+
+
+def over_speed(height: Callable[[Floats, Floats], Floats], edges: list[float], peak: float) -> tuple[float, float]:
+    """(time, ∫(peak - v) dt) of a ramp with y = ``height``(v, peak - v), smooth between ``edges``."""
+    time = lag = 0.0
+    for low, high in zip(edges, edges[1:], strict=False):
+        v, below, weight = between(low, high, peak)
+        pace = weight / np.sqrt(2 * height(v, below))
+        time, lag = time + float(pace.sum()), lag + float(pace @ below)
+    return time, lag
+
+
+def between(low: float, high: float, peak: float) -> tuple[Floats, Floats, Floats]:
+    """(n,) speeds, peak - speed, and weights of a quadrature that tolerates square roots at both ends."""
+    share, weight = _rule()
+    return low + (high - low) * share, (peak - high) + (high - low) * share[::-1], (high - low) * weight
+
+
+@cache
+def _rule() -> tuple[Floats, Floats]:
+    x, w = np.polynomial.legendre.leggauss(_NODES)
+    s = (1 + x) / 2
+    return s**2 * (3 - 2 * s), 3 * s * (1 - s) * w

@@ -1,0 +1,156 @@
+"""Least ∫P² dt of a mass moved from rest to rest, P = m a v, under limits of speed, acceleration and jerk.
+
+Over speed the cost of a ramp is ∫m² v² sqrt(2y) dv. With κ the price of distance and none for time at the peak speed V,
+its integrand with prices is least at y0 = κ (V - v)/(2 m² v²). The ramp follows y0 as far as |dy/dv| <= J and y <= A²/2
+let it; before, it rises with slope J and falls with slope -J. Where the fall begins follows from Pontryagin's
+principle: over it the derivative of the integrand by y has integral zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, isfinite, log, sqrt
+
+import numpy as np
+from scipy.optimize import brentq
+
+from trajopt.velocity_domain.axis import Axis, between, over_speed
+from trajopt.velocity_domain.motor import Floats
+from trajopt.velocity_domain.power import least_peak, rising_root
+
+
+@dataclass(frozen=True)
+class SquareOptimum:
+    """The least ∫P² dt, W² s, with the peak speed (m/s) and the energy (J) of the move that has it."""
+
+    value: float
+    peak: float
+    energy: float
+
+
+def least_square_power(axis: Axis) -> SquareOptimum:
+    """The least ∫(m a v)² dt. Raises ValueError for a duration below the least, which it names."""
+    low = least_peak(axis)
+
+    def surplus(peak: float) -> float:
+        return sum(ramp.extent()[0] for ramp in _ramps(axis, peak)) - axis.duration
+
+    peak = rising_root(surplus, low * (1 + 1e-9), axis.velocity)
+    value = sum(ramp.cost() for ramp in _ramps(axis, peak))
+    return SquareOptimum(value, peak, axis.mass * peak**2)
+
+
+def _ramps(axis: Axis, peak: float) -> list[_Ramp]:
+    """The two ramps to a peak speed with which, and with a stay there, the end is reached in time."""
+    target = peak * axis.duration - axis.distance
+
+    def ramps(z: float) -> list[_Ramp]:
+        return [_Ramp(axis.mass, axis.jerk, limit, peak, exp(z)) for limit in axis.ramps]
+
+    def excess(z: float) -> float:
+        return log(sum(ramp.extent()[1] for ramp in ramps(z)) / target)
+
+    low = high = log(axis.mass**2 * peak**3 / axis.duration**2)
+    while excess(high) > 0 and high < low + 60:
+        high += 2
+    while excess(low) < 0:
+        low -= 2
+    return ramps(high if excess(high) > 0 else float(brentq(excess, low, high, xtol=1e-14, rtol=1e-14)))
+
+
+@dataclass(frozen=True)
+class _Ramp:
+    """A ramp under a price of distance."""
+
+    mass: float
+    jerk: float
+    acceleration: float
+    peak: float
+    price: float
+
+    def extent(self) -> tuple[float, float]:
+        """(time, ∫(peak - v) dt)."""
+        turn, join = self._fall()
+        return over_speed(lambda v, below: self._height(v, below, turn, join), self._edges(turn, join), self.peak)
+
+    def cost(self) -> float:
+        """∫P² dt, W² s."""
+        turn, join = self._fall()
+        edges, total = self._edges(turn, join), 0.0
+        for low, high in zip(edges, edges[1:], strict=False):
+            v, below, weight = between(low, high, self.peak)
+            total += float(weight @ (self.mass**2 * v**2 * np.sqrt(2 * self._height(v, below, turn, join))))
+        return total
+
+    def _free(self, v: float) -> float:
+        """y0."""
+        return self.price * (self.peak - v) / (2 * self.mass**2 * v**2)
+
+    def _height(self, v: Floats, below: Floats, turn: float, join: float) -> Floats:
+        free = self.price * below / (2 * self.mass**2 * v**2)
+        if not isfinite(self.jerk):
+            return np.minimum(free, self.acceleration**2 / 2)
+        falling = np.where(v < join, self.jerk * (below + (turn - self.peak)), free)
+        return np.minimum(np.minimum(self.jerk * v, self.acceleration**2 / 2), falling)
+
+    def _edges(self, turn: float, join: float) -> list[float]:
+        found = [turn / 2, join, self._level()]
+        if isfinite(self.jerk):
+            rise = self.acceleration**2 / (2 * self.jerk)
+            found += [rise, turn - rise]
+        return [0.0, *sorted({v for v in found if 0 < v < self.peak}), self.peak]
+
+    def _level(self) -> float:
+        """The speed at which y0 passes the limit of acceleration; 0 without one."""
+        if not isfinite(self.acceleration):
+            return 0.0
+        share = self.price / (self.mass * self.acceleration) ** 2
+        return 2 * self.peak / (1 + sqrt(1 + 4 * self.peak / share))
+
+    def _fall(self) -> tuple[float, float]:
+        """The line y = J (turn - v) of the fall: ``turn``, and the speed at which it ends on y0."""
+        if not isfinite(self.jerk):
+            return 0.0, 0.0
+        steep = self._steep()
+        crossing = max(self._level(), self._meeting())
+        if crossing >= steep:
+            return crossing + self._free(crossing) / self.jerk, crossing
+        low = steep + self._free(steep) / self.jerk
+        high = min(crossing + self._free(crossing) / self.jerk, self.peak)
+        if low >= high or self._balance(high, steep) <= 0:
+            return high, self._joined(high, steep)
+        turn = float(brentq(lambda c: self._balance(c, steep), low, high, xtol=1e-15 * self.peak, rtol=1e-14))
+        return turn, self._joined(turn, steep)
+
+    def _steep(self) -> float:
+        """The speed below which y0 falls faster than J."""
+
+        def slope(v: float) -> float:
+            return self.price * (2 * self.peak - v) / (2 * self.mass**2 * self.jerk) - v**3
+
+        return self.peak if slope(self.peak) >= 0 else float(brentq(slope, 0.0, self.peak, rtol=1e-14))
+
+    def _meeting(self) -> float:
+        """The speed at which the rise y = J v meets y0."""
+
+        def gap(v: float) -> float:
+            return 2 * self.mass**2 * self.jerk * v**3 - self.price * (self.peak - v)
+
+        return float(brentq(gap, 0.0, self.peak, rtol=1e-14))
+
+    def _joined(self, turn: float, steep: float) -> float:
+        """Where the fall meets y0 for the second time; the peak if it does not."""
+
+        def gap(v: float) -> float:
+            return self.jerk * (turn - v) - self._free(v)
+
+        if turn >= self.peak or gap(steep) <= 0:
+            return self.peak if turn >= self.peak else steep
+        return float(brentq(gap, steep, min(turn, self.peak), rtol=1e-14))
+
+    def _balance(self, turn: float, steep: float) -> float:
+        """∫∂/∂y of the integrand over the fall."""
+        start = max(turn / 2, turn - self.acceleration**2 / (2 * self.jerk))
+        v, below, weight = between(start, self._joined(turn, steep), self.peak)
+        y = self.jerk * (turn - v)
+        return float(weight @ ((self.mass**2 * v**2 - self.price * below / (2 * y)) / np.sqrt(2 * y)))
