@@ -16,7 +16,11 @@ _ENOUGH = 1e-10  # relative: the loss at which the default number of touches sto
 
 
 class Approach:
-    """Both ramps to a velocity limit with chattering after the first touch."""
+    """Both ramps to a velocity limit with chattering after the first touch.
+
+    ``lowest``: the duration of a move that chatters without end, which none can beat (theorems 3 and 4 of the paper
+    named in :mod:`trajopt.switching.chatter`); minus infinity if the distance, here one, is below ``least_distance``.
+    """
 
     def __init__(self, left: Side, right: Side) -> None:
         self.sides = (left, right)

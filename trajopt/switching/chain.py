@@ -100,6 +100,8 @@ class Arcs:
     lower bound on the least duration, or minus infinity. ``residual``, ``excess``: relative, as verified.
     ``ordinary``: for fourth-order moves between rests, the duration of the S-curve, the same ramps nested without
     chattering or asymmetric peaks; None elsewhere. ``chatters``: whether the least duration needs switches without end.
+    ``gap``: where the structure was read from a coarse program, the duration by which the multipliers leave the end
+    short of the farthest that any move of this duration reaches: zero proves that no move just shorter exists.
     """
 
     durations: tuple[float, ...]
@@ -111,6 +113,7 @@ class Arcs:
     excess: float
     ordinary: float | None = None
     chatters: bool = False
+    gap: float | None = None
 
     @property
     def duration(self) -> float:
@@ -147,4 +150,5 @@ def back_in_time(arcs: Arcs, units: tuple[float, ...], time: float) -> Arcs:
         touches=tuple((t * time, name) for t, name in arcs.touches),
         lowest=min(arcs.lowest * time, fsum(durations)),  # never above by rounding
         ordinary=None if arcs.ordinary is None else arcs.ordinary * time,
+        gap=None if arcs.gap is None else arcs.gap * time,
     )

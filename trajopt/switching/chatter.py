@@ -82,7 +82,7 @@ def chattering(ratio: float = 1.0) -> Chattering:
 @lru_cache(maxsize=64)
 def first_arc(ratio: float = 1.0) -> FirstArc:
     """The approach from (0, 0, 1) by Newton's method: three arcs to the first touch, whose costate is the cubic that
-    joins the self-similar one with continuous value and slope."""
+    joins the self-similar one with continuous value and slope. Raises ArithmeticError for ratios below about 0.05."""
     own = chattering(ratio)
     b1, b2, b3 = own.switches
     value, slope = (c * own.period**k for c, k in ((-b1 * b2 * b3, 3), (b1 * b2 + b1 * b3 + b2 * b3, 2)))
@@ -120,7 +120,7 @@ def _period_residual(x: Vector, ratio: float) -> Vector:
     states = _end(np.array([b1, b2 - b1, 1 - b2]), (a, 0 * a, 0 * a), ratio)
     start, end = -b1 * b2 * b3, (1 - b1) * (1 - b2) * (1 - b3)
     slopes = b1 * b2 + b1 * b3 + b2 * b3, (1 - b1) * (1 - b2) + (1 - b1) * (1 - b3) + (1 - b2) * (1 - b3)
-    # the trivial root alpha = 1 is divided out of nothing here: the guess and the step limit keep away from it
+    # alpha = 1 and -1 are roots too: the guess and the limited steps keep away from them
     return np.array(
         [states[0] - alpha * a, states[1], states[2], end - alpha**3 * start, slopes[1] - alpha**2 * slopes[0]]
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate
 from math import fsum, inf, isfinite
 
@@ -11,16 +11,18 @@ from trajopt.switching.chain import NAMES, Arcs, Chain, Unresolved, back_in_time
 from trajopt.switching.coarse import Grid, Sketch
 from trajopt.switching.low import normalised, shortest_low
 from trajopt.switching.polynomials import Audit, audit
-from trajopt.switching.repair import GROWTH, with_limit, with_touches, without_shortest
-from trajopt.switching.stationary import Condition, shortest_sequence
+from trajopt.switching.repair import with_limit, with_touches, without_shortest
+from trajopt.switching.stationary import Condition, prices_of, shortest_sequence
 
-_COARSE, _FINE = 60, 120
+_GRIDS = (60, 90, 120, 170)  # intervals, the first of them to find the duration
 _SHORTEST, _LONGEST, _GROWTH = 0.2, 200.0, 1.1  # of the normalised time: where the first possible duration is sought
 _CLOSE = 1e-3  # relative: width of the bracket from which the structure is read
 _REPAIRS = 8
 _ROUNDS = 3  # touches added at each end of a plateau of velocity
+_SHARES = (1.0, 0.7, 0.4, 0.2)  # of the jerk of a self-similar touch, where a new one is begun
 _NEAR = 0.02  # relative: a structure this much longer than the coarse move is not that of the coarse move
 _EXTREMAL = 1e-10  # relative gap
+_CUT_OFF = 1e-5  # the same where chattering was cut off, which leaves a gap far above the loss of duration
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,15 @@ class _Found:
     def duration(self) -> float:
         return fsum(p.duration for p in self.sketch.pieces)
 
+    @property
+    def dwell(self) -> float:
+        return min(p.duration for p in self.sketch.pieces)
+
+    @property
+    def touches(self) -> int:
+        """Of a limit of velocity."""
+        return sum(t.derivative == 1 for t in self.sketch.touches)
+
 
 def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
     """A verified move whose structure a coarse program shows.
@@ -46,14 +57,19 @@ def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arc
     lowest = _lower_orders(scaled)
     duration = _first_possible(scaled, lowest)
     found: list[_Found] = []
-    for intervals in (_COARSE, _FINE):
+    for intervals in _GRIDS:
         grid = Grid(scaled, duration, intervals)
         for way in (1.0, -1.0):
-            tops = grid.farthest(way)
-            if tops is not None and (one := _refined(scaled, grid.sketch(tops))) is not None:
-                found += _chattering(scaled, one, _ROUNDS if touches is None else touches)
-        found = [f for f in found if f.duration <= duration * (1 + _NEAR) and _dwell(f) * time >= min_dwell]
-        if any(f.gap <= _EXTREMAL * f.duration for f in found):
+            if (tops := grid.farthest(way)) is None:
+                continue
+            for local in (True, False):
+                if (one := _refined(scaled, grid.sketch(tops), local)) is not None:
+                    found += _chattering(scaled, one, _ROUNDS if touches is None else touches)
+                    if one.gap <= _EXTREMAL * one.duration:
+                        break
+        found = [f for f in found if f.duration <= duration * (1 + _NEAR) and f.dwell * time >= min_dwell]
+        found = [f for f in found if touches is None or f.touches <= 2 * touches]
+        if any(f.gap <= (_CUT_OFF if _chatters(f) else _EXTREMAL) * f.duration for f in found):
             break
     if not found:
         raise Unresolved("no structure that a coarse program shows could be verified")
@@ -61,8 +77,8 @@ def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arc
     return back_in_time(_arcs(best, min(lowest, best.duration)), units, time)
 
 
-def _dwell(found: _Found) -> float:
-    return min(p.duration for p in found.sketch.pieces)
+def _chatters(found: _Found) -> bool:
+    return {"snap", "velocity"} <= {p.active.partition(".")[0] for p in found.sketch.pieces}
 
 
 def _chattering(chain: Chain, found: _Found, rounds: int) -> list[_Found]:
@@ -71,23 +87,22 @@ def _chattering(chain: Chain, found: _Found, rounds: int) -> list[_Found]:
     for _ in range(rounds):
         if chain.order < 4 or out[-1].gap <= _EXTREMAL * out[-1].duration:
             break
-        if (more := with_touches(chain, out[-1].sketch)) is None:
-            break
-        again = _refined(chain, _grown(chain, *more))
+        again = _more_touches(chain, out[-1].sketch)
         if again is None or again.duration >= out[-1].duration:
             break
         out.append(again)
     return out
 
 
-def _grown(chain: Chain, sketch: Sketch, jerks: list[Condition]) -> Sketch:
-    """A sketch with new touches whose jerks grow to those of a self-similar approach, as far as they will."""
-    for step in (1, 2, 3, 4, 5, 6):
-        pins = [replace(c, value=c.value * GROWTH ** ((step - 1) / 5)) for c in jerks]
-        if (solved := _solved(chain, sketch, [*_conditions(chain, sketch), *pins])) is None:
-            break
-        sketch = solved[0]
-    return sketch
+def _more_touches(chain: Chain, sketch: Sketch) -> _Found | None:
+    """With a touch more beside each plateau of velocity: first with its jerk prescribed, then freed."""
+    for share in _SHARES:
+        if (more := with_touches(chain, sketch, share)) is None:
+            return None
+        conditions = [*_conditions(chain, more[0]), *more[1]]
+        if (pinned := _solved(chain, more[0], conditions, True)) and (found := _refined(chain, pinned, True)):
+            return found
+    return None
 
 
 def _lower_orders(chain: Chain) -> float:
@@ -108,30 +123,31 @@ def _lower_orders(chain: Chain) -> float:
 def _first_possible(chain: Chain, lowest: float) -> float:
     """A duration in which a coarse move is possible, close above one in which none is."""
     low, high = 0.0, max(_SHORTEST, 0.98 * lowest)
-    while not Grid(chain, high, _COARSE).reaches():
+    while not Grid(chain, high, _GRIDS[0]).reaches():
         low, high = high, high * _GROWTH
         if high > _LONGEST + 10 * lowest:
             raise Unresolved("no duration was found in which a coarse move is possible")
     while low and high / low > 1 + _CLOSE:
         middle = (low + high) / 2
-        low, high = (low, middle) if Grid(chain, middle, _COARSE).reaches() else (middle, high)
+        low, high = (low, middle) if Grid(chain, middle, _GRIDS[0]).reaches() else (middle, high)
     return high
 
 
-def _refined(chain: Chain, sketch: Sketch) -> _Found | None:
+def _refined(chain: Chain, sketch: Sketch, local: bool) -> _Found | None:
     """The stationary sequence of a sketch, repaired until it is verified: arcs that vanish go, limits that are broken
     are held or touched."""
     for _ in range(_REPAIRS):
         conditions = _conditions(chain, sketch)
-        if (solved := _solved(chain, sketch, conditions)) is None:
+        if (solved := _solved(chain, sketch, conditions, local)) is None:
             if (smaller := without_shortest(sketch)) is None:
                 return None
             sketch = smaller
             continue
-        sketch, prices = solved
+        sketch = solved
         tops, durations, active = zip(*((p.top, p.duration, p.active) for p in sketch.pieces), strict=True)
         verdict = audit(chain, tops, durations)
         if verdict.accepted:
+            prices = prices_of((0.0, *chain.start[1:]), tops, conditions, durations)
             return _Found(sketch, verdict, shortfall(chain, active, durations, conditions, prices))
         if (held := with_limit(chain, sketch, verdict.worst)) is None:
             return None
@@ -139,16 +155,15 @@ def _refined(chain: Chain, sketch: Sketch) -> _Found | None:
     return None
 
 
-def _solved(chain: Chain, sketch: Sketch, conditions: list[Condition]) -> tuple[Sketch, tuple[float, ...]] | None:
-    """The sketch with stationary durations, and the prices of its conditions."""
+def _solved(chain: Chain, sketch: Sketch, conditions: list[Condition], local: bool) -> Sketch | None:
+    """The sketch with stationary durations."""
     tops, durations, _ = zip(*sketch.pieces, strict=True)
     if len(conditions) > len(tops):
         return None
-    found = shortest_sequence((0.0, *chain.start[1:]), tops, conditions, durations)
+    found = shortest_sequence((0.0, *chain.start[1:]), tops, conditions, durations, local)
     if found is None:
         return None
-    pieces = tuple(p._replace(duration=d) for p, d in zip(sketch.pieces, found.durations, strict=True))
-    return Sketch(pieces, sketch.touches), found.prices
+    return Sketch(tuple(p._replace(duration=d) for p, d in zip(sketch.pieces, found, strict=True)), sketch.touches)
 
 
 def _conditions(chain: Chain, sketch: Sketch) -> list[Condition]:
@@ -173,7 +188,6 @@ def _arcs(found: _Found, lowest: float) -> Arcs:
         (ends[t.arcs - 1], f"{NAMES[t.derivative]}.{'max' if t.upper else 'min'}") for t in found.sketch.touches
     )
     durations, tops, active = zip(*((p.duration, p.top, p.active) for p in pieces), strict=True)
-    limits = {name.partition(".")[0] for name in active}
     return Arcs(
         durations,
         tops,
@@ -182,5 +196,6 @@ def _arcs(found: _Found, lowest: float) -> Arcs:
         lowest,
         verdict.residual,
         verdict.excess,
-        chatters={"snap", "velocity"} <= limits,
+        chatters=_chatters(found),
+        gap=found.gap,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from trajopt.switching.chain import NAMES, Arcs, Chain, Impossible, Unresolved, back_in_time
+from trajopt.switching.doomed import refuse_doomed
 from trajopt.switching.polynomials import audit
 from trajopt.switching.third import Profile, extremals
 
@@ -17,7 +18,6 @@ class OutOfRange(Unresolved):
 
 def shortest_low(chain: Chain) -> Arcs:
     """The shortest move of order one to three. Raises Impossible, Unresolved, or OutOfRange."""
-    refuse_doomed(chain)
     scaled, units, time = normalised(chain)
     free = _without_position(scaled)
     for profile in extremals(scaled):
@@ -55,23 +55,6 @@ def feasible_durations(chain: Chain) -> list[tuple[float, float]]:
     return list(zip(times[::2], times[1::2], strict=True))
 
 
-def refuse_doomed(chain: Chain) -> None:
-    """Raise Impossible if a boundary state breaks a limit, or must before or after."""
-    for name, end, sense in (("start", chain.start, 1.0), ("end", chain.end, -1.0)):
-        for i, (x, (low, high)) in enumerate(zip(end, chain.limits, strict=False)):
-            if not low - _slack(low, x) <= x <= high + _slack(high, x):
-                raise Impossible(f"the {NAMES[i]} at the {name} is {x:g}, outside its limits {low:g} to {high:g}")
-        if chain.order >= 2:
-            i = chain.order - 2
-            x, rate = end[i], sense * end[i + 1]
-            way = 1 if rate > 0 else -1
-            stop = chain.limits[i][rate > 0]
-            reached = x + way * rate**2 / 2 / (-chain.top[0] if rate > 0 else chain.top[1])
-            if (reached - stop) * way > _slack(stop, x):
-                when = "after" if sense > 0 else "before"
-                raise Impossible(f"{when} the {name} the {NAMES[i]} must reach {reached:g}, beyond its limit {stop:g}")
-
-
 def normalised(chain: Chain) -> tuple[Chain, tuple[float, ...], float]:
     """The chain with its top limit and the largest boundary value of order one, the units, and that of time."""
     top = max(chain.top[1], -chain.top[0])
@@ -80,10 +63,6 @@ def normalised(chain: Chain) -> tuple[Chain, tuple[float, ...], float]:
     time = max(((abs(x) / top) ** (1 / (n - i)) for i, x in values), default=0.0) or 1.0
     length = top * time**n
     return chain.scaled(length, time), tuple(length / time**i for i in range(n + 1)), time
-
-
-def _slack(limit: float, value: float) -> float:
-    return 1e-12 * max(abs(limit), abs(value)) if abs(limit) < inf else 0.0
 
 
 def _without_position(chain: Chain) -> Chain:
@@ -95,7 +74,8 @@ def _twins(a: Profile, b: Profile) -> bool:
 
 
 def _nothing(chain: Chain) -> Impossible | Unresolved:
-    low, high = chain.limits[1]
-    if chain.order > 1 and low < 0 < high:
-        return Unresolved("no extremal of this move could be verified")
-    return Impossible(f"no move covers {chain.distance:g} with a velocity from {low:g} to {high:g}")
+    """An axis that can wait and turn about can do any move; one that cannot is bound by what keeps it from that."""
+    for name, (low, high) in zip(NAMES[1:], chain.limits[1:], strict=False):
+        if not low < 0 < high:
+            return Impossible(f"no move covers {chain.distance:g} with {name} from {low:g} to {high:g}")
+    return Unresolved("no extremal of this move could be verified")

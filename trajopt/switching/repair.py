@@ -12,7 +12,6 @@ from trajopt.switching.polynomials import advance, instants, states
 from trajopt.switching.ramps import Piece
 from trajopt.switching.stationary import Condition
 
-GROWTH = 8.0
 _TOUCH = 0.23  # share of the last arc of a ramp that the jerk of a first touch would take, measured on ramps from rest
 
 
@@ -77,16 +76,16 @@ class _Ending:
     jerk: float
 
 
-def with_touches(chain: Chain, sketch: Sketch) -> tuple[Sketch, list[Condition]] | None:
-    """One touch more before and after each plateau of velocity, and the jerks there, so small that the rest of the move
-    hardly changes: ``GROWTH`` times these are the jerks of a self-similar approach. None without such a plateau."""
+def with_touches(chain: Chain, sketch: Sketch, share: float) -> tuple[Sketch, list[Condition]] | None:
+    """One touch more before and after each plateau of velocity, and the jerks there, a share of those of a self-similar
+    approach: the smaller, the less the rest of the move changes. None without such a plateau."""
     pieces: list[Piece] = []
     touches: list[Touch] = []
     jerks: list[Condition] = []
     old = {t.arcs: t for t in sketch.touches}
     k = 0
     while k < len(sketch.pieces):
-        ending = _ending(chain, sketch, k, True) or _ending(chain, sketch, k, False)
+        ending = _ending(chain, sketch, k, True, share) or _ending(chain, sketch, k, False, share)
         if ending is None:
             pieces.append(sketch.pieces[k])
             k += 1
@@ -101,7 +100,7 @@ def with_touches(chain: Chain, sketch: Sketch) -> tuple[Sketch, list[Condition]]
     return (Sketch(tuple(pieces), tuple(touches)), jerks) if jerks else None
 
 
-def _ending(chain: Chain, sketch: Sketch, k: int, towards: bool) -> _Ending | None:
+def _ending(chain: Chain, sketch: Sketch, k: int, towards: bool, share: float) -> _Ending | None:
     """For the arcs from number k on, if they end at a plateau of velocity (or begin there): one arc that no touch
     precedes (or follows), or the three after one (or before)."""
     pieces, touched = sketch.pieces, {t.arcs for t in sketch.touches if t.derivative == 1}
@@ -118,7 +117,7 @@ def _ending(chain: Chain, sketch: Sketch, k: int, towards: bool) -> _Ending | No
             continue
         law, old = chattering(abs(back / forth)), [p.duration for p in pieces[k:last]]
         first = old if towards else old[::-1]
-        scale = (law.alpha * sum(old) / sum(law.greedy) if used == 3 else _TOUCH * old[0]) / GROWTH
+        scale = (law.alpha * sum(old) / sum(law.greedy) if used == 3 else _TOUCH * old[0]) * share
         first[-1] -= scale
         before, after = (_alternate(chain, forth, back, d) for d in (first, [d * scale for d in law.greedy]))
         if not towards:

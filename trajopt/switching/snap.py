@@ -15,7 +15,7 @@ from math import inf, sqrt
 from scipy.optimize import brentq
 
 from trajopt.switching.approach import MOST_TOUCHES, Approach, after_touch
-from trajopt.switching.chain import Arcs, Chain, Unresolved, back_in_time
+from trajopt.switching.chain import NAMES, Arcs, Chain, Impossible, Unresolved, back_in_time
 from trajopt.switching.ramps import (
     Part,
     Piece,
@@ -33,6 +33,7 @@ from trajopt.switching.sequences import Candidate, Parts, accepted, certified, k
 from trajopt.switching.stationary import Condition, shortest_sequence
 
 _CLOSED = 1e-11  # relative: bracket at which the search among sequences ends
+_ROUNDING = 1e-14  # of the distance
 _EVEN = (1.97, 1.92, 0.05)  # from a touch to one of nearly the same jerk
 
 
@@ -40,10 +41,14 @@ def between_rests(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
     """The shortest move of a fourth-order chain between rests; the distance is not zero.
 
     ``min_dwell``: the least time between switches; ``touches``: at most that many at each end. Raises Unresolved where
-    no sequence that keeps them could be verified.
+    no sequence that keeps them could be verified, Impossible where a limit forbids to set off or to stop.
     """
     if chain.distance < 0:
         return mirrored_arcs(between_rests(chain.mirrored(), min_dwell, touches))
+    for i in (1, 2, 3):
+        low, high = chain.limits[i]
+        if not high > 0 or (i > 1 and not low < 0):
+            raise Impossible(f"no move covers {chain.distance:g} with {NAMES[i]} from {low:g} to {high:g}")
     scaled, units, time = _units(chain)
     return back_in_time(_scaled(scaled, min_dwell / time, touches), units, time)
 
@@ -80,24 +85,28 @@ def _scaled(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
         cuts = list(approach.chattering(min_dwell, touches))
         found += cuts if chatters else [certified(chain, cut.parts) for cut in cuts]
         lowest = max([lowest, *(cut.lowest for cut in found)])
+
+    def allowed(candidate: Candidate) -> bool:
+        # a touch in the middle belongs to both ends
+        few = touches is None or len(candidate.parts) <= 2 * touches + 2
+        return few and keeps(candidate, min_dwell)
+
     if not chatters:
-        for candidate in _short(chain, left, right, approach, touches):
+        for candidate in _short(chain, left, right, approach):
             found.append(candidate)
             lowest = max(lowest, candidate.lowest)
             closed = candidate.lowest >= candidate.duration * (1 - _CLOSED)
-            if closed and keeps(candidate, min_dwell) and accepted(chain, candidate) is not None:
+            if closed and allowed(candidate) and accepted(chain, candidate) is not None:
                 break
     found.append(curve)
-    for candidate in sorted(found, key=lambda c: c.duration):
-        if keeps(candidate, min_dwell) and (arcs := accepted(chain, candidate)) is not None:
+    for candidate in sorted(filter(allowed, found), key=lambda c: c.duration):
+        if (arcs := accepted(chain, candidate)) is not None:
             bound = min(max(lowest, 0.0), arcs.duration)
             return replace(arcs, lowest=bound, ordinary=curve.duration, chatters=chatters)
     raise Unresolved("no sequence of arcs with the least spacing of switches asked for could be verified")
 
 
-def _short(
-    chain: Chain, left: Side, right: Side, approach: Approach | None, touches: int | None
-) -> Iterator[Candidate]:
+def _short(chain: Chain, left: Side, right: Side, approach: Approach | None) -> Iterator[Candidate]:
     """Moves that never hold the velocity: the hill, one touch, then as many as the distance suggests."""
     if (top := _hill(left, right)) is not None:
         yield certified(chain, [top])
@@ -108,7 +117,7 @@ def _short(
         for guess in [] if left == right else _shifted(left, right, single):
             if (candidate := _polished(chain, guess, False)) is not None:
                 yield candidate
-    for guess in _many(approach, touches):
+    for guess in _many(approach):
         parts = [merged(part) for part in guess]
         if (candidate := _polished(chain, parts, left == right)) is not None:
             yield candidate
@@ -136,9 +145,10 @@ def _single(left: Side, right: Side) -> Parts | None:
         return 1.0 - sum(motion(to_velocity(side, limit, jerk)).distance for side in (left, right))
 
     most = min(greatest_jerk(side, limit) for side in (left, right))
-    if short(0.0) > 0 or short(most) < 0:
+    longest = short(0.0)
+    if longest > _ROUNDING or short(most) < 0:
         return None
-    return ramps(float(brentq(short, 0.0, most, xtol=1e-300, rtol=8.9e-16)))
+    return ramps(float(brentq(short, 0.0, most, xtol=1e-300, rtol=8.9e-16)) if longest < 0 else 0.0)
 
 
 def _shifted(left: Side, right: Side, single: Parts) -> Iterator[Parts]:
@@ -154,7 +164,7 @@ def _shifted(left: Side, right: Side, single: Parts) -> Iterator[Parts]:
         yield [first, (Piece(left.snap, late, "snap.max"), cut, *second[1:])]
 
 
-def _many(approach: Approach, touches: int | None) -> Iterator[Parts]:
+def _many(approach: Approach) -> Iterator[Parts]:
     """Guesses with two and more touches: ideal approaches whose inner part has the length that the distance leaves."""
     scale = sum(jerk / side.snap for side, jerk in zip(approach.sides, approach.jerks, strict=True)) / 2
     law = approach.laws[0]
@@ -174,9 +184,7 @@ def _many(approach: Approach, touches: int | None) -> Iterator[Parts]:
         key=lambda plan: plan[0],
     )
     for _, extra, middle in plans:
-        count = level + 1 + extra
-        if touches is None or count <= touches:
-            yield _guess(approach, count, middle)
+        yield _guess(approach, level + 1 + extra, middle)
 
 
 def _outside(x: float, low: float, high: float) -> float:
@@ -237,7 +245,7 @@ def _polished(chain: Chain, guess: Parts, twins: bool) -> Candidate | None:
     found = shortest_sequence((0.0,) * 4, tops, conditions, [p.duration for part in parts for p in part])
     if found is None:
         return None
-    left = iter(found.durations)
+    left = iter(found)
     sequence: Parts = [tuple(p._replace(duration=next(left)) for p in part) for part in parts]
     if twins:
         second = [backwards(part) for part in reversed(sequence)]

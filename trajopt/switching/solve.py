@@ -6,8 +6,9 @@ from contextlib import suppress
 from dataclasses import replace
 
 from trajopt.switching.chain import Arcs, Chain, Unresolved
+from trajopt.switching.doomed import refuse_doomed
 from trajopt.switching.general import shortest_general
-from trajopt.switching.low import OutOfRange, refuse_doomed, shortest_low
+from trajopt.switching.low import OutOfRange, shortest_low
 from trajopt.switching.snap import between_rests
 
 _OPEN = 1e-9  # relative: a loss that only a wrong structure leaves
@@ -20,7 +21,8 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
     below 1e-10 of the duration, after ``touches`` touches of the limit at each end, or before two switches come closer
     than ``min_dwell``; ``bracket`` tells what that costs. Orders one to three do not chatter and ignore both.
     The bracket is closed but for rounding for orders one to three without active position limits, and for fourth-order
-    moves between rests; elsewhere the structure is that of a coarse program, and the lower bound that of lower orders.
+    moves between rests, save a few short ones whose limits of acceleration or snap differ by side. Elsewhere the
+    structure is that of a coarse program, and the lower bound that of lower orders.
     Raises Impossible, or Unresolved when no list of arcs could be verified.
     """
     if min_dwell < 0 or (touches is not None and touches < 0):

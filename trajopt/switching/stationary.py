@@ -32,23 +32,15 @@ class Condition:
     value: float
 
 
-@dataclass(frozen=True)
-class Stationary:
-    """``durations``: (K,) of the arcs; ``prices``: (M,) multipliers: duration per unit of each condition's value, with
-    the sign of an increase."""
-
-    durations: tuple[float, ...]
-    prices: tuple[float, ...]
-
-
 def shortest_sequence(
-    start: State, tops: Sequence[float], conditions: Sequence[Condition], guess: Sequence[float]
-) -> Stationary | None:
+    start: State, tops: Sequence[float], conditions: Sequence[Condition], guess: Sequence[float], local: bool = True
+) -> tuple[float, ...] | None:
     """The stationary durations near a guess, or None if Newton's method leaves positive durations or does not settle.
 
-    With as many conditions as arcs this is the plain root. All numbers are expected of order one.
+    ``local``: see the system; which of the two converges from farther away depends on the sequence. With as many
+    conditions as arcs this is the plain root. All numbers are expected of order one.
     """
-    system = _System(np.array(start), np.array(tops), conditions)
+    system = _System(np.array(start), np.array(tops), conditions, local)
     times = np.cumsum(guess)
     prices = -_prices(system, times)
     size = len(times)
@@ -75,65 +67,97 @@ def shortest_sequence(
         before, moved = moved, float(np.max(np.abs(step[:size]))) / times[-1]
         # where rounding sets in, steps stop shrinking
         if share == 1.0 and (moved < _SETTLED or (moved < _NOISE and moved > before / 2)):
-            return Stationary(tuple(map(float, np.diff(times, prepend=0.0))), tuple(map(float, -prices)))
+            return tuple(map(float, np.diff(times, prepend=0.0)))
     return None
 
 
 def prices_of(
     start: State, tops: Sequence[float], conditions: Sequence[Condition], durations: Sequence[float]
 ) -> tuple[float, ...]:
-    """The multipliers that come nearest to making given durations stationary."""
-    system = _System(np.array(start), np.array(tops), conditions)
+    """The multipliers that come nearest to making given durations stationary: duration per unit of each condition's
+    value, with the sign of an increase."""
+    system = _System(np.array(start), np.array(tops), conditions, False)
     return tuple(map(float, _prices(system, np.cumsum(durations))))
 
 
 def _prices(system: _System, times: Vector) -> Vector:
     _, slope, _ = system.evaluate(times, np.zeros(len(system.last)))
-    return np.asarray(np.linalg.lstsq(slope.T, system.duration, rcond=None)[0], dtype=np.float64)
+    # conditions and borders differ by powers of the shortest arc: both are scaled to one
+    of_condition = _inverse(np.max(np.abs(slope), axis=1))
+    of_border = _inverse(np.max(np.abs(slope * of_condition[:, None]), axis=0))
+    matrix = (slope * of_condition[:, None] * of_border).T
+    solution = np.linalg.lstsq(matrix, system.duration * of_border, rcond=None)[0]
+    return np.asarray(solution * of_condition, dtype=np.float64)
+
+
+def _inverse(sizes: Vector) -> Vector:
+    return 1 / np.where(sizes > 0, sizes, 1.0)
 
 
 class _System:
-    def __init__(self, start: Vector, tops: Vector, conditions: Sequence[Condition]) -> None:
-        self.jumps = np.diff(tops, prepend=0.0)
-        self.arcs = len(tops)
+    """The conditions as functions of the border times.
+
+    A condition is computed from the last border before it where its derivative and all above are known, which is the
+    start of the move or that of a plateau; ``local`` false: always from the start of the move.
+    """
+
+    def __init__(self, start: Vector, tops: Vector, conditions: Sequence[Condition], local: bool) -> None:
+        order, self.arcs = len(start), len(tops)
         self.duration = np.zeros(self.arcs)
         self.duration[-1] = 1.0
         self.last = np.array([c.arcs - 1 for c in conditions])
-        self.before = np.arange(self.arcs) <= self.last[:, None]
-        self.inner = np.arange(self.arcs) < self.last[:, None]
-        order = len(start)
         self.powers = np.array([order - c.derivative for c in conditions])
         self.values = np.array([c.value for c in conditions])
-        # what the start state alone gives, and its first two derivatives: rows of Taylor coefficients
+        known = _known(start, conditions) if local else {0: start}
+        self.base = np.array([_base(known, c, order) for c in conditions])
+        arcs = np.arange(self.arcs)
+        self.within = (arcs >= self.base[:, None]) & (arcs <= self.last[:, None])
+        self.jumps = np.where(self.within, np.diff(tops, prepend=0.0), 0.0)
+        # what the known state alone gives, and its first two derivatives: rows of Taylor coefficients
         self.free = np.zeros((3, len(conditions), order))
         for row, c in enumerate(conditions):
+            self.jumps[row, self.base[row]] = tops[self.base[row]]
             for shift in range(3):
-                taylor = start[c.derivative + shift :]
+                taylor = known[int(self.base[row])][c.derivative + shift :]
                 self.free[shift, row, : len(taylor)] = taylor / _FACTORIALS[: len(taylor)]
 
     def evaluate(self, times: Vector, prices: Vector) -> tuple[Vector, Vector, Vector]:
         """Conditions (M,), their gradients (M, K) by border times, and the (K, K) Hessian of prices @ conditions."""
-        rows, here = np.arange(len(self.last)), times[self.last]
-        since = np.where(self.before, here[:, None] - np.concatenate([[0.0], times[:-1]]), 0.0)
-        table = np.empty((6, *since.shape))  # jumps * since**k / k!, k = -1 .. 4, zero for k = -1
-        table[0] = 0.0
-        table[1] = np.where(self.before, self.jumps, 0.0)
+        rows, starts = np.arange(len(self.last)), np.concatenate([[0.0], times[:-1]])
+        since = np.where(self.within, times[self.last][:, None] - starts, 0.0)
+        table = np.zeros((6, *since.shape))  # jumps * since**k / k!, k = -1 .. 4, zero for k = -1
+        table[1] = self.jumps
         for k in range(1, 5):
             table[k + 1] = table[k] * since / k
         now, first, second = (table[self.powers + shift, rows] for shift in (1, 0, -1))
-        free = np.sum(self.free * here[:, None] ** np.arange(self.free.shape[2]), axis=2)
-        value = now.sum(axis=1) + free[0] - self.values
+        second[self.powers < 2] = 0.0
+        free = np.sum(self.free * since[rows, self.base][:, None] ** np.arange(self.free.shape[2]), axis=2)
+        for part, known in zip((now, first, second), free, strict=True):
+            part[rows, self.base] += known
+        # border k - 1 is the start of arc k
         slope = np.zeros_like(since)
-        # border i is the start of arc i + 1
-        slope[:, :-1] = -first[:, 1:] * self.inner[:, :-1]
-        slope[rows, self.last] += first.sum(axis=1) + free[1]
-        second = np.where(self.powers[:, None] >= 2, second, 0.0)
-        curved = prices[:, None] * second[:, 1:] * self.inner[:, :-1]
+        slope[:, :-1] = -first[:, 1:]
+        slope[rows, self.last] += first.sum(axis=1)
+        curved = prices[:, None] * second
         bend = np.zeros((self.arcs, self.arcs))
         span = np.arange(self.arcs - 1)
-        bend[span, span] = curved.sum(axis=0)
+        bend[span, span] = curved[:, 1:].sum(axis=0)
         cross = np.zeros_like(bend)
-        np.add.at(cross, self.last, np.pad(curved, ((0, 0), (0, 1))))
+        np.add.at(cross[:, :-1], self.last, curved[:, 1:])
         bend -= cross + cross.T
-        np.add.at(bend, (self.last, self.last), prices * (second.sum(axis=1) + free[2]))
-        return value, slope, bend
+        np.add.at(bend, (self.last, self.last), curved.sum(axis=1))
+        return now.sum(axis=1) - self.values, slope, bend
+
+
+def _known(start: Vector, conditions: Sequence[Condition]) -> dict[int, Vector]:
+    """States by the number of arcs before them, not a number where a derivative is not prescribed there."""
+    known = {0: start}
+    for c in conditions:
+        known.setdefault(c.arcs, np.full(len(start), np.nan))[c.derivative] = c.value
+    return known
+
+
+def _base(known: dict[int, Vector], condition: Condition, order: int) -> int:
+    return max(
+        b for b, state in known.items() if b < condition.arcs and not np.isnan(state[condition.derivative :]).any()
+    )

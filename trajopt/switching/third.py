@@ -95,11 +95,15 @@ def _third(chain: Chain) -> Iterator[tuple[float, ...]]:
     if chain.start[1:] == chain.end[1:] and chain.distance == 0:
         return
     yield from case.free()
-    if top < inf:
+    if least == 0:
+        yield from case.coasting(False)
+    if top == 0:
+        yield from case.coasting(True)
+    if 0 < top < inf:
         yield from case.held(top)
-    if least > -inf:
+    if 0 > least > -inf:
         yield from _backwards(chain)
-    if top < inf and least > -inf:
+    if 0 < top < inf and 0 > least > -inf:
         yield from case.both(top, least)
 
 
@@ -126,6 +130,16 @@ class _Case:
         durations = (t1, hold1, t2, 0.0, t5, hold2, t7)
         if most > 0 and all(map(isfinite, durations)):
             yield (*durations[:3], (self.distance - self._run(durations)) / most, *durations[4:])
+
+    def coasting(self, first: bool) -> Iterator[tuple[float, ...]]:
+        """Where a limit of acceleration is zero: held there, at the velocity that the first or the last arc leaves."""
+        speed = self.v0 - self.a0**2 / 2 / self.up if first else self.v1 - self.a1**2 / 2 / self.up
+        t1, hold1, t2 = _reach(speed - self.v0, self.a0, self.chain.limits[2][1], self.up, self.down)
+        t7, hold2, t5 = _reach(speed - self.v1, -self.a1, -self.chain.limits[2][0], self.up, self.down)
+        durations = (t1, hold1, t2 + t5, 0.0, 0.0, hold2, t7)
+        if speed and all(map(isfinite, durations)):
+            rest = (self.distance - self._run(durations)) / speed
+            yield (t1, rest, t5, 0.0, 0.0, hold2, t7) if first else (t1, hold1, t2, 0.0, 0.0, rest, t7)
 
     def free(self) -> Iterator[tuple[float, ...]]:
         """No plateau: peaks b and c of acceleration with b² - c² = k; the unknown is s = b - c."""
@@ -238,7 +252,11 @@ def _reach(gain: float, start: float, top: float, up: float, down: float) -> tup
     if peak == inf:
         return inf, inf, inf
     spare = gain - (peak**2 - start**2) / 2 / up - peak**2 / 2 / down
-    return (peak - start) / up, spare / peak if peak == top else 0.0, peak / down
+    if peak == 0:
+        hold = 0.0 if abs(spare) <= 1e-14 * (abs(gain) + start**2 / up) else inf
+    else:
+        hold = spare / peak if peak == top else 0.0
+    return (peak - start) / up, hold, peak / down
 
 
 def _real(coefficients: Vector) -> list[float]:
