@@ -64,6 +64,12 @@ class Report:
         return max(self.checks, key=lambda check: (not check.passed, check.ratio))
 
     @property
+    def excess(self) -> float:
+        """The worst excess of a limit, relative to it (to the signal's own peak where that is smaller)."""
+        limits = [check for check in self.checks if check.name.startswith("limit ") and check.tolerance > 0]
+        return max((check.violation / check.tolerance * self.tolerance for check in limits), default=0.0)
+
+    @property
     def failed(self) -> tuple[Check, ...]:
         """The checks that did not pass."""
         return tuple(check for check in self.checks if not check.passed)
@@ -74,6 +80,7 @@ class Report:
         return {
             "passed": self.passed,
             "tolerance": self.tolerance,
+            "excess": self.excess,
             "decided_by": self.decided_by,
             "worst": {
                 "name": worst.name, "violation": worst.violation, "tolerance": worst.tolerance, "time": worst.time,
