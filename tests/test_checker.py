@@ -23,6 +23,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import trajopt
 from trajopt import checker
 from trajopt.checker import CheckerInputError, check, check_file, measure, result_file
 from trajopt.checker.float_twin import FloatTwin
@@ -688,8 +689,11 @@ def test_ten_thousand_intervals() -> None:
 
 
 def write(folder: Path, data: Data, name: str = "result.json") -> Path:
+    """The file of a result, with the seal that belongs to it."""
     path = folder / name
-    path.write_text(json.dumps(data))
+    data = {key: value for key, value in data.items() if key != "seal"}
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    path.write_text(json.dumps(data | {"seal": hashlib.sha256(text.encode()).hexdigest()}))
     return path
 
 
@@ -713,7 +717,7 @@ def test_a_file_and_its_table(name: str, tmp_path: Path) -> None:
     assert plain.passed
     table = write_table(tmp_path, data)
     report = check_file(path, strict=True)
-    assert report.passed and report.not_checked == () and len(report.checks) == len(check(data).checks) + 1
+    assert report.passed and report.not_checked == () and len(report.checks) == len(check(data).checks) + 2  # seal and table
     text = table.read_text()
     lines = text.splitlines()
     for wrong in (
@@ -734,9 +738,9 @@ def test_columns_beyond_the_trajectory_are_said_not_to_be_checked(tmp_path: Path
     data = s_curve(load=LOAD)
     path, table = write(tmp_path, data), write_table(tmp_path, data)
     lines = table.read_text().splitlines()
-    table.write_text("\n".join([lines[0], lines[1] + ",F [N]", *(line + ",5" for line in lines[2:])]))
+    table.write_text("\n".join([lines[0], lines[1] + ",T [K]", *(line + ",5" for line in lines[2:])]))
     report = check_file(path)
-    assert report.passed and "F [N]" in report.not_checked[0]
+    assert report.passed and "T [K]" in report.not_checked[0]
 
 
 def test_no_solution_has_no_table(tmp_path: Path) -> None:
@@ -842,9 +846,53 @@ def test_a_report_says_what_is_wrong_in_one_line() -> None:
     data["trajectory"]["velocity"][5] *= 1.01
     report = check(data)
     told = report.to_dict()
-    assert set(told) == {"passed", "tolerance", "decided_by", "worst", "failed", "checks", "not_checked"}
+    assert set(told) == {"passed", "tolerance", "excess", "decided_by", "worst", "failed", "checks", "not_checked"}
     assert set(told["worst"]) == {"name", "violation", "tolerance", "time"}
     assert told["worst"]["name"] == "dynamics velocity" and told["worst"]["time"] == data["trajectory"]["time"][5]
     assert told["checks"] == len(report.checks) and not told["passed"]
     assert all("\n" not in line for line in told["failed"])
     assert report.summary().startswith("FAILED")
+
+
+def test_force_and_power_of_a_table_are_recomputed_and_units_compared(tmp_path: Path) -> None:
+    problem = trajopt.load("clemen_rupp_power_l2", ["transcription.intervals=20"])
+    trajopt.solve(problem).save(tmp_path)
+    path, table = tmp_path / "result.json", tmp_path / "trajectory.csv"
+    report = check_file(path)
+    assert report.passed and report.not_checked == ()
+    text = table.read_text()
+    lines = text.splitlines()
+    for column in (-1, -2):
+        cells = lines[9].split(",")
+        cells[column] = repr(float(cells[column]) * (1 + 1e-9))
+        table.write_text(text.replace(lines[9], ",".join(cells)))
+        assert [failed.name for failed in check_file(path).failed] == ["trajectory.csv"]
+    for name, wrong in (("q [m]", "q [mm]"), ("P [W]", "P [kW]"), ("F [N]", "F [N m]")):
+        table.write_text(text.replace(name, wrong))
+        assert wrong in check_file(path).summary()
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda data: data["prices"][0].update(per_percent=99.0),
+        lambda data: data["audit"].update(tolerance=1.0),
+        lambda data: data["route"].update(solver="another"),
+        lambda data: data["metrics"].pop("rms_jerk"),
+        lambda data: data.update(explanation={"text": ["because"]}),
+        lambda data: data.update(status="SOLVED_LOCAL"),
+        lambda data: data.update(certificate=None),
+    ],
+    ids=["price", "audit", "route", "metric", "explanation", "status", "certificate"],
+)
+def test_any_edit_breaks_the_seal(edit: Any, tmp_path: Path) -> None:
+    trajopt.solve(trajopt.load("clemen_rupp_jerk_l2", ["transcription.intervals=12"])).save(tmp_path)
+    path = tmp_path / "result.json"
+    assert check_file(path).passed
+    data = json.loads(path.read_text())
+    edit(data)
+    path.write_text(json.dumps(data))
+    assert "seal" in {failed.name for failed in check_file(path).failed}
+    del data["seal"]
+    path.write_text(json.dumps(data))
+    assert "missing" in check_file(path).summary()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -142,6 +143,12 @@ class Solution:
             "trajectory": None if self.trajectory is None else self.trajectory.to_dict(),
         }
 
+    def sealed(self, **extra: Any) -> dict[str, Any]:
+        """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
+        data = self.to_dict() | extra
+        text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
+
     def save(self, directory: str | Path) -> list[Path]:
         """Write result.json, trajectory.csv, trajectory.png, prices.png and, where vibration is limited, vibration.png
         into ``directory``; returns the paths.
@@ -160,7 +167,7 @@ class Solution:
         written = [directory / "result.json"]
         for stale in ("trajectory.csv", *pictures):  # of another answer
             (directory / stale).unlink(missing_ok=True)
-        write_atomically(written[0], json.dumps(self.to_dict(), indent=1, allow_nan=False).encode())
+        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
         if self.trajectory is None:
             return written
         written.append(directory / "trajectory.csv")

@@ -95,6 +95,7 @@ class Case:
     gap: float | None
     has_certificate: bool
     vibration: tuple[Mode, ...] = ()
+    rotary: bool = False
 
     @property
     def count(self) -> int:

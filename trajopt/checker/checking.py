@@ -34,6 +34,7 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
         return _report([*checks, question("structure", str(fault))], False, strict, notes)
     checks.append(question("structure"))
     if case is None:
+        notes.append(f"the verdict {result['status']} (what proves it was checked when it was found, and is not in the file)")
         return _report(checks, strict, strict, notes)
     checks += [*time_checks(case), *certificate_checks(case, notes), *vibration_checks(case)]
     decided, rational = decide(case, strict, notes)
@@ -41,12 +42,13 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
 
 
 def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None = None, strict: bool = False) -> Report:
-    """Check the result file at ``path``, and a trajectory.csv beside a result.json, which must say the same.
+    """Check the result file at ``path``, its seal, and a trajectory.csv beside a result.json, which must say the same.
 
     Raises CheckerInputError when the file cannot be read as JSON data at all.
     """
     result = read_json(Path(path))
     report = check(result, problem, strict=strict)
+    report = replace(report, checks=(question("seal", _seal_fault(result)), *report.checks))
     table = Path(path).with_name("trajectory.csv")
     if Path(path).name != "result.json" or not os.path.lexists(table):
         return report
@@ -90,6 +92,14 @@ def _identity(result: Mapping[str, Any], problem: Mapping[str, Any] | None) -> l
     if problem is not None:
         checks.append(question("same problem", "" if _same(problem, own) else "the result belongs to another problem"))
     return checks
+
+
+def _seal_fault(result: Mapping[str, Any]) -> str:
+    """Whether anything in the file was changed since it was written."""
+    if "seal" not in result:
+        return "missing: the file was edited, or not written by trajopt"
+    found = _hash({key: value for key, value in result.items() if key != "seal"})
+    return "" if result["seal"] == found else "broken: something in the file was edited"
 
 
 def _same(problem: Mapping[str, Any], own: Any) -> bool:

@@ -32,7 +32,7 @@ class _Pieces(NamedTuple):
         return _Pieces(self.interval, self.offset, half).joined(_Pieces(self.interval, self.offset + half, half))
 
 
-class _Instants(NamedTuple):
+class Instants(NamedTuple):
     """Where a quantity is sampled: nodes (or intervals, for the top derivative) and the weight of each sample."""
 
     node: NDArray[np.intp]
@@ -179,22 +179,22 @@ class FloatTwin:
 
     # at the nodes
 
-    def instants(self, name: str) -> _Instants:
+    def instants(self, name: str) -> Instants:
         """The samples of a quantity and what each stands for (s; 1 in the plain sums of the Euler scheme)."""
         count, interval = self.case.count, np.arange(self.case.count)
         if not self.case.depends_on_top(name):
             weight = np.zeros(count + 1)
             weight[:-1] += self.step / 2
             weight[1:] += self.step / 2
-            found = _Instants(np.arange(count + 1), np.minimum(np.arange(count + 1), count - 1), weight)
+            found = Instants(np.arange(count + 1), np.minimum(np.arange(count + 1), count - 1), weight)
         elif name in LOADED:
             both = np.concatenate([interval, interval])
-            found = _Instants(np.concatenate([interval, interval + 1]), both, np.tile(self.step / 2, 2))
+            found = Instants(np.concatenate([interval, interval + 1]), both, np.tile(self.step / 2, 2))
         else:
-            found = _Instants(interval, interval, self.step)
+            found = Instants(interval, interval, self.step)
         return found._replace(weight=np.ones_like(found.weight)) if self.euler else found
 
-    def sampled(self, i: int, instants: _Instants) -> Array:
+    def sampled(self, i: int, instants: Instants) -> Array:
         return self.case.signal[i][instants.interval if i == self.case.order else instants.node]
 
     def samples(self, name: str, convention: int = 0) -> tuple[Array, Array]:
@@ -203,10 +203,10 @@ class FloatTwin:
         if name not in LOADED:
             return self.sampled(DERIVATIVES.index(name), instants), instants.weight
         velocity = self.sampled(1, instants)
-        friction = self.case.coulomb * _friction_signs(velocity, self.case.rest)[convention]
+        friction = self.case.coulomb * friction_signs(velocity, self.case.rest)[convention]
         return self.loaded(name, instants, velocity, friction), instants.weight
 
-    def loaded(self, name: str, instants: _Instants, velocity: Array, friction: Array) -> Array:
+    def loaded(self, name: str, instants: Instants, velocity: Array, friction: Array) -> Array:
         assert self.case.inertia is not None
         inertia = self.case.inertia.at(self.case.time[instants.node])
         force = inertia * self.sampled(2, instants) + self.case.viscous * velocity + friction
@@ -336,7 +336,7 @@ class FloatTwin:
         return highest(np.concatenate([above, -below]), 0.0, 1e-9)[0]
 
 
-def _friction_signs(velocity: Array, rest: float) -> list[Array]:
+def friction_signs(velocity: Array, rest: float) -> list[Array]:
     """Signs of friction at samples, by convention (see `Case.conventions`)."""
     sign = np.sign(velocity)
     resting = np.abs(velocity) <= rest

@@ -75,7 +75,7 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
             str(name): _number(value, f"metrics.{name}")
             for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
         },
-        vibration=_vibration(problem.get("vibration", ())),
+        vibration=_vibration(problem.get("vibration", ())), rotary=problem.get("rotary") is True,
         **_certificate(result.get("certificate")),
     )  # fmt: skip
 
