@@ -336,7 +336,7 @@ def test_missing_keys_and_unknown_words_are_caught() -> None:
         assert not check({**data, key: None}).passed or key == "trajopt"
     for changed in ({"status": "solved"}, {"status": ["SOLVED"]}, {"format": "trajopt result 2"}, {"objective": True}):
         assert not check({**data, **changed}).passed
-    for section, extra in (("limits", {"torque": {"max": 1.0}}), ("load", {"gravity": 9.81}), ("move", {"dwell": 1.0})):
+    for section, extra in (("limits", {"torque": {"max": 1.0}}), ("load", {"gravity": 9.81}), ("move", {"pause": 1.0})):
         odd = copy.deepcopy(data)
         odd["problem"][section].update(extra)
         assert "does not know" in check(sealed(odd)).failed[0].note

@@ -14,7 +14,7 @@ import numpy as np
 
 from trajopt import units
 from trajopt.attempt import Attempt, Clock, convex
-from trajopt.fields import Limit, Table
+from trajopt.fields import Envelope, Limit, Table
 from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible
@@ -46,7 +46,7 @@ def explain(setting: Setting, clock: Clock) -> dict[str, Any]:
 
 
 def _kinematic(problem: Problem) -> dict[str, Limit]:
-    return {name: limit for name, limit in problem.limits.given().items() if name != "power"}
+    return {name: limit for name, limit in problem.limits.given().items() if name not in ("power", "brake_energy")}
 
 
 def _sides(problem: Problem) -> dict[str, list[str]]:
@@ -118,7 +118,7 @@ def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock
     certificate) or none was found in the time."""
     attempt = _widening(setting, duration, widen, clock)
     quantity, _, side = name.partition(".")
-    limit = getattr(setting.problem.limits, quantity)
+    limit = setting.problem.limits.given()[quantity]
     now = limit.lowest if side == "min" else limit.highest
     unit = units.kinds(setting.problem.rotary)[quantity].unit
     known: dict[str, Any] = {"now": now, "unit": unit, "varies": limit.varies, "value": None, "factor": None}
@@ -184,7 +184,12 @@ def widened(problem: Problem, name: str, value: float) -> Problem:
     """The problem with one limit (or one side of it, ``velocity.max``) set to a cure's value."""
     quantity, _, side = name.partition(".")
     limit = getattr(problem.limits, quantity)
-    assert not isinstance(limit.max, Table)
-    sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
-    limits = problem.limits.model_copy(update={quantity: Limit(**sides)})
+    changed: Limit | Envelope
+    if isinstance(limit, Envelope):
+        changed = limit.scaled(value / limit.force[0])
+    else:
+        assert not isinstance(limit.max, Table)
+        sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
+        changed = Limit(**sides)
+    limits = problem.limits.model_copy(update={quantity: changed})
     return problem.replace(limits=limits)

@@ -83,6 +83,20 @@ def nonnegative(kind: str) -> BeforeValidator:
     return BeforeValidator(read)
 
 
+def plain(*, most: float, example: str, least: float = -math.inf, above: float = -math.inf) -> BeforeValidator:
+    """A number without a unit, ``least`` to ``most``, or ``above`` one and up to ``most``."""
+    wanted = f"{least:g} to {most:g}" if math.isfinite(least) else f"above {above:g} and at most {most:g}"
+
+    def read(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+            raise ValueError(f"must be a plain number such as {example}, no text and no unit, got {shown(value)}")
+        if not (least <= value <= most and value > above):
+            raise ValueError(f"must be {wanted}, got {shown(value)}")
+        return float(value)
+
+    return BeforeValidator(read)
+
+
 class Table(Section):
     """A value that varies over the move: piecewise linear in time, constant outside the table."""
 
@@ -157,6 +171,78 @@ class Limit(Section):
         return tuple(t for side in (self.min, self.max) if isinstance(side, Table) for t in side.time)
 
 
+class Envelope(Section):
+    """Which force a motor has at which speed: piecewise linear from standstill on, the same in all four quadrants.
+
+    ``speed`` (n,) m/s or rad/s, from 0, increasing, none beyond the last; ``force`` (n,) N or N m, not increasing and
+    concave, so that the envelope is convex.
+    """
+
+    speed: tuple[float, ...]
+    force: tuple[float, ...]
+
+    @property
+    def limit(self) -> Limit:
+        """What holds each of `lines`: plus-minus the force at standstill."""
+        return Limit(min=-self.force[0], max=self.force[0])
+
+    @property
+    def lines(self) -> list[tuple[float, float]]:
+        """(a, b) of the sides: a·|force| + b·|velocity| is at most the force at standstill."""
+        sides = []
+        points = list(zip(self.speed, self.force, strict=True))
+        for (slow, strong), (fast, weak) in zip(points, points[1:], strict=False):
+            slope = (strong - weak) / (fast - slow)
+            level = strong + slope * slow  # of the line at standstill
+            sides.append((self.force[0] / level, slope * self.force[0] / level))
+        return [*sides, (0.0, self.force[0] / self.speed[-1])]
+
+    def scaled(self, factor: float) -> Envelope:
+        """The envelope with speeds and forces times a factor."""
+        return Envelope(speed=tuple(factor * x for x in self.speed), force=tuple(factor * x for x in self.force))
+
+
+def read_envelope(value: Any, info: ValidationInfo) -> Envelope | None:
+    if value is None or isinstance(value, Envelope):
+        return value if value is None else _concave(value)
+    if not isinstance(value, Mapping):
+        raise ValueError(f'must be {{ speed = ["0 rpm", ...], torque = ["2 N m", ...] }}, got {shown(value)}')
+    refuse_unknown(value, ("speed", "torque", "force"))
+    if "torque" in value and "force" in value:
+        raise ValueError("give torque or force, not both")
+    column = "force" if "force" in value else "torque"
+    for key in ("speed", column):
+        if value.get(key) is None:
+            raise ValueError(f"{key}: is missing; write a list of speeds, and {column} = a list of as many values")
+    speeds = tuple(si(x, "velocity", info) for x in sequence(value["speed"], "speed"))
+    forces = tuple(si(x, "force", info) for x in sequence(value[column], column))
+    return _concave(Envelope(speed=speeds, force=forces))
+
+
+def _concave(envelope: Envelope) -> Envelope:
+    speed, force = envelope.speed, envelope.force
+    if len(speed) != len(force) or len(speed) < 2:
+        counts = f"{len(speed)} speeds, {len(force)} torques"
+        raise ValueError(f"needs as many torques as speeds, at least two; got {counts}")
+    if not np.all(np.isfinite([*speed, *force])):
+        raise ValueError("must be finite")
+    if speed[0] != 0:
+        raise ValueError(f"speed: must start at standstill, 0, got {speed[0]:g}")
+    if force[0] <= 0 or min(force) < 0:
+        raise ValueError(f"torque: must be > 0 at standstill and nowhere negative, got {min(force):g}")
+    steps, changes = np.diff(speed), np.diff(force)
+    if np.any(steps <= 0):
+        raise ValueError(f"speed: must increase, got {speed[int(np.argmax(steps <= 0)) + 1]:g} after a higher one")
+    if np.any(changes > 0):
+        at = speed[int(np.argmax(changes > 0)) + 1]
+        raise ValueError(f"torque: must not increase with the speed, as it does up to {at:g}")
+    bends = np.diff(changes / steps)
+    if np.any(bends > 1e-9 * force[0] / speed[-1]):
+        at = speed[int(np.argmax(bends)) + 1]
+        raise ValueError(f"torque: bends inwards at speed {at:g}; leave that point out, or lower those before it")
+    return envelope
+
+
 def read_limit(kind: str) -> BeforeValidator:
     def read(value: Any, info: ValidationInfo) -> Limit | None:
         if value is None or isinstance(value, Limit):
@@ -174,6 +260,25 @@ def read_limit(kind: str) -> BeforeValidator:
         if len(pair) != 2:
             raise ValueError(f"needs one value (plus-minus) or a pair [min, max], got {len(pair)} values")
         return _checked(Limit(min=si(pair[0], kind, info), max=si(pair[1], kind, info)), value)
+
+    return BeforeValidator(read)
+
+
+def read_ceiling(kind: str) -> BeforeValidator:
+    """A limit from above on what is never negative: one number."""
+
+    def read(value: Any, info: ValidationInfo) -> Limit | None:
+        if value is None:
+            return None
+        highest = value
+        if isinstance(value, Limit) and value.min is None:
+            highest = value.max
+        elif isinstance(value, Mapping) and set(value) == {"max"}:
+            highest = value["max"]
+        bound = si(highest, kind, info)
+        if bound <= 0:
+            raise ValueError(f"must be > 0, got {shown(highest)}; leave the key out for no limit")
+        return Limit(max=bound)
 
     return BeforeValidator(read)
 

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from trajopt.checker.case import DERIVATIVES, EPS, VALUE, Case
+from trajopt.checker.case import DERIVATIVES, EPS, TOTALS, VALUE, Case
 from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.rational_twin import RationalTwin
 from trajopt.checker.report import Check, Found, Number, to_float
@@ -63,6 +63,10 @@ def tasks_of(case: Case, quick: FloatTwin, relative: float, notes: list[str]) ->
         tasks.append(_Task(f"drift {name}", _DRIFT * size + coordinate, methodcaller("drift", i)))
     tasks += _state_tasks(case)
     for name in case.limits:
+        if name in TOTALS:
+            tolerance = _limit_tolerance(case, name, to_float(quick.total(name)), relative)
+            tasks.append(_Task(f"limit {name}", tolerance, methodcaller("excess_in_total", name)))
+            continue
         tolerance = _limit_tolerance(case, name, quick.peak(name), relative)
         tasks.append(_Task(f"limit {name}", tolerance, methodcaller("excess", name, tolerance)))
     return tasks + _value_tasks(case, notes)
@@ -136,4 +140,6 @@ def metric_names(case: Case) -> tuple[str, ...]:
     names = [f"{kind}_{name}" for name in DERIVATIVES[1 : case.order + 1] for kind in ("peak", "rms")]
     if case.inertia is not None:
         names += ["energy", "peak_power", "rms_power", "peak_force", "rms_force"]
+    if case.inertia is not None and case.motor is not None:
+        names += ["peak_current", "rms_current", "peak_voltage", "copper_loss", "electrical_energy", "brake_energy"]
     return (*names, "distance")
