@@ -100,17 +100,31 @@ def implied(problem: Problem) -> Problem:
 
 def available_force(problem: Problem, velocity: tuple[float, float]) -> tuple[float, float]:
     """The least and greatest force that the limits allow at any velocity of a range."""
+    found = _range(problem.limits.force)
+    for name in ("current", "voltage", "envelope"):
+        found = _both(found, forces(problem, name, velocity))
+    return found
+
+
+def forces(problem: Problem, name: str, velocity: tuple[float, float]) -> tuple[float, float]:
+    """What one limit of the motor leaves of the force at any velocity of a range: the least and the greatest."""
     limits, motor = problem.limits, problem.load.motor
-    force = _range(limits.force)
-    if limits.envelope is not None:
-        force = _both(force, (-limits.envelope.force[0], limits.envelope.force[0]))
-    if motor is not None:
-        constant, resistance = motor
-        current, voltage = _range(limits.current), _range(limits.voltage)
-        force = _both(force, (constant * current[0], constant * current[1]))
-        back = (voltage[0] - constant * velocity[1], voltage[1] - constant * velocity[0])  # less the induced voltage
-        force = _both(force, (constant / resistance * back[0], constant / resistance * back[1]))
-    return force
+    if name == "envelope":
+        if limits.envelope is None:
+            return -np.inf, np.inf
+        slowest = 0.0 if velocity[0] <= 0 <= velocity[1] else min(abs(velocity[0]), abs(velocity[1]))
+        most = float(np.interp(slowest, limits.envelope.speed, limits.envelope.force))
+        return -most, most
+    low, high = _range(getattr(limits, name))
+    if motor is None:
+        return -np.inf, np.inf
+    constant, resistance = motor
+    if name == "current":
+        return constant * low, constant * high
+    return (  # voltage, less the one that the velocity induces
+        constant / resistance * (low - constant * velocity[1]),
+        constant / resistance * (high - constant * velocity[0]),
+    )
 
 
 def _range(limit: Limit | None) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from trajopt import units
 from trajopt.fields import Limit
 from trajopt.problem import DERIVATIVES, ELECTRICAL, LOADED, MOST_INTERVALS, MOTOR, Problem, State
+from trajopt.rating import refuse_weak_motor
 
 SYMBOLS: Final = ("q", "v", "a", "j", "s")
 CLAMPED = 1e-9  # a boundary state outside its limit by this fraction of the limit is a rounding, not a contradiction
@@ -23,6 +24,7 @@ def refuse_contradictions(problem: Problem) -> None:
     for where, state in _states(problem):
         _within_limits(problem, where, state)
     _doomed(problem)
+    refuse_weak_motor(problem)
 
 
 def warnings(problem: Problem) -> list[str]:
