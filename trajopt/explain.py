@@ -18,7 +18,7 @@ from trajopt.fields import Envelope, Limit, Table
 from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible
-from trajopt.problem import FREE, Problem
+from trajopt.problem import FREE, TOTALS, Problem
 from trajopt.routing import waits_at_an_end
 from trajopt.scaling import sizes_of
 from trajopt.time_search import farthest, feasible_times, minimum_time
@@ -139,6 +139,7 @@ def _conflict(together: Attempt, duration: float) -> list[dict[str, Any]]:
     for name, weight in weights.items():
         at = together.outcome.prices[name].at[weight > 1e-3 * largest] if largest else np.empty(0)
         if len(at):
+            at = np.array([0.0, 1.0]) if name.partition(".")[0] in TOTALS else at
             conflict.append({"limit": name, "from": float(at.min() * duration), "to": float(at.max() * duration)})
     return conflict
 

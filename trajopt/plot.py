@@ -178,7 +178,8 @@ def _names(trajectory: Trajectory) -> list[str]:
     problem = trajectory.problem
     names: list[str] = [*DERIVATIVES[: trajectory.order + 1]]
     if problem.load.inertia is not None:
-        wanted = problem.limits.force is not None or any(term.minimize == "force" for term in problem.objective.terms)
+        limited = any(getattr(problem.limits, name) is not None for name in ("force", "envelope", "rms_force"))
+        wanted = limited or any(term.minimize == "force" for term in problem.objective.terms)
         names += ["force", "power"] if wanted else ["power"]
         names += _ELECTRICAL if problem.load.motor else ()
     return names

@@ -207,6 +207,7 @@ MINIMIZABLE: Final = (
 )  # fmt: skip
 WITHOUT_NORM: Final = ("energy", "copper_loss", "electrical_energy", "time")
 LOADED: Final = ("force", "power", "energy", "envelope", "rms_force")  # what needs an inertia ...
+TOTALS: Final = ("rms_force", "brake_energy")  # of the whole move, not of an instant
 ELECTRICAL: Final = ("current", "voltage", "copper_loss", "electrical_energy", "brake_energy")  # ... and a motor, too
 
 
