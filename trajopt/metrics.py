@@ -14,6 +14,7 @@ from trajopt.problem import DERIVATIVES
 from trajopt.signals import OnFloats, Signal, gauss, product
 from trajopt.trajectory import Trajectory
 
+_PARTS: Final = 400  # on these, 18 points miss no change of sign that matters
 _HALVINGS: Final = 20  # each leaves a quarter of the error in the interval of a change of sign
 
 
@@ -64,7 +65,8 @@ def _flows(trajectory: Trajectory) -> tuple[float, float]:
         power = motor.power(load, force.nodes, velocity.nodes)
         signs = (np.maximum(power, 0.0), np.maximum(-power, 0.0))
         return float(np.trapezoid(signs[0], trajectory.time)), float(np.trapezoid(signs[1], trajectory.time))
-    trajectory = trajectory.cut(np.concatenate([_reversals(trajectory, name) for name in ("force", "velocity")]))
+    corners = [_reversals(trajectory, name) for name in ("force", "velocity")]
+    trajectory = trajectory.cut(np.concatenate([*corners, np.linspace(0.0, trajectory.duration, _PARTS)]))
     for _ in range(_HALVINGS):
         power, energy = _drawn(trajectory)
         mixed = (power.min(axis=0) < 0) & (power.max(axis=0) > 0)

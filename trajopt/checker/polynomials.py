@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from trajopt.checker.case import Array
 from trajopt.checker.report import to_float
 
+_DIVISION = 800  # what changes its sign and back within a tenth of such a part is nothing
 Integers: TypeAlias = NDArray[np.intp]
 Poly: TypeAlias = tuple[list[int], int]  # coefficients of powers (or Bernstein polynomials) of s, over one denominator
 
@@ -98,7 +99,8 @@ def absolute_integral(rows: Array, length: Array) -> float:
 def both_signs(function: Callable[[Integers, Array], Array], length: Array) -> tuple[float, float]:
     """The integrals of max(0, f) and max(0, -f) over pieces; ``function`` gives f on pieces (n,) at s (n, points).
 
-    By Gauss points, on halves of halves where they do not yet agree: corners cost a halving for each bit.
+    By Gauss points on a fine division, and on halves of halves where those do not yet agree: a corner costs a halving
+    for each bit.
     """
     points, shares = np.polynomial.legendre.leggauss(10)
     points, shares = (points + 1) / 2, shares / 2
@@ -107,9 +109,11 @@ def both_signs(function: Callable[[Integers, Array], Array], length: Array) -> t
         values = function(index, start[:, None] + width[:, None] * points)
         return np.stack([np.maximum(values, 0.0) @ shares, np.maximum(-values, 0.0) @ shares], axis=1)
 
-    index, start, width = np.arange(len(length)), np.zeros(len(length)), np.ones(len(length))
+    each = -(-_DIVISION // len(length))
+    index, width = np.repeat(np.arange(len(length)), each), np.full(each * len(length), 1.0 / each)
+    start = np.tile(np.arange(each) / each, len(length))
     coarse, total = means(index, start, width), np.zeros(2)
-    enough = 1e-13 * float(np.sum(coarse * length[:, None])) / len(length)
+    enough = 1e-13 * float(np.sum(coarse * (length[index] * width)[:, None])) / len(index)
     for _ in range(60):
         half = width / 2
         fine = np.stack([means(index, start, half), means(index, start + half, half)])
