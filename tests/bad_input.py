@@ -305,8 +305,8 @@ def _motor() -> Iterator[Bad]:
     no_motor = MOTOR[: MOTOR.index("torque_constant")] + '[objective]\nminimize="jerk"\nnorm="l2"\n'
     for key, value in (
         ("limits.current", "1 A"), ("limits.voltage", "10 V"), ("limits.brake_energy", "1 J"),
-        ("load.eddy", "1 ohm s^2"), ("load.switching", "4 W/A"), ("load.recovery", "0.5"), ("load.hysteresis_exponent", "1.5"),
-        ("load.resistance", "3 ohm"), ("objective.minimize", "current"),
+        ("load.eddy", "1 ohm s^2"), ("load.switching", "4 W/A"), ("load.recovery", "0.5"),
+        ("load.hysteresis_exponent", "1.5"), ("load.resistance", "3 ohm"), ("objective.minimize", "current"),
     ):  # fmt: skip
         words = ("load.torque_constant: is missing", "needs it", 'write torque_constant = "0.57 N m/A"')
         yield _set(f"no-motor-{key}", f"{key}={value}", words=words, text=no_motor)
