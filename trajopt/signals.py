@@ -49,7 +49,16 @@ class OnFloats:
         return np.abs(x) ** exponent, exponent * np.abs(x) ** (exponent - 1) * np.sign(x)
 
     def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
-        """The sign of a velocity at the nodes, and on the intervals (of its mean: it must not change on one)."""
+        """The sign of a velocity at the nodes, and at the ends of the intervals."""
+        nodes = np.sign(velocity.nodes)
+        return nodes, (nodes[:-1], nodes[1:])
+
+
+class BetweenReversals(OnFloats):
+    """The arithmetic of arrays where no velocity changes its sign between nodes."""
+
+    def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
+        """The sign of a velocity at the nodes, and of its mean on the intervals, whose ends may rest."""
         return np.sign(velocity.nodes), (np.sign(np.mean(velocity.pieces or (np.zeros(1),), axis=0)),)
 
 

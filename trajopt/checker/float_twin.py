@@ -391,6 +391,11 @@ class FloatTwin:
             return [self.flow(kind, at_rest) for at_rest in resting]
         return [absolute_integral(self.polynomial(quantity)[1], length)]
 
+    @cached_property
+    def exchanged(self) -> float:
+        """The energy that goes to and fro, mechanical and as heat, J."""
+        return sum(to_float(self.metric(name)[0]) for name in ("energy", "copper_loss"))
+
     def flow(self, kind: str, at_rest: float) -> float:
         """The electrical energy of the move, or the energy fed back in it."""
         assert self.case.motor is not None
