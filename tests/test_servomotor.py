@@ -182,6 +182,27 @@ def test_energies_between_the_nodes(exponent: float, intervals: int) -> None:
     assert solution.metrics["peak_voltage"] == pytest.approx(np.max(np.abs(3 * force / 0.57 + 0.57 * v)), rel=1e-5)
 
 
+@pytest.mark.parametrize("limits", [{"acceleration": 800.0}, {"acceleration": 800.0, "jerk": 2e4}], ids=["a", "j"])
+@pytest.mark.parametrize(("minimize", "norm"), [("electrical_energy", None), ("copper_loss", None), ("force", "l2")])
+def test_friction_turns_with_the_axis(minimize: str, norm: str | None, limits: dict[str, Any]) -> None:
+    """There and back: the check knows only the velocity's own sign at every sample."""
+    for start, end, distance in ((30.0, -20.0, 1.0), (0.0, 10.0, -3.0)):
+        ends = {"start": {"velocity": start}, "end": {"velocity": end}}
+        solution = solved(motor(minimize, norm, distance=distance, limits=limits, **ends, intervals=41))
+        velocity = solution.trajectory.chain[1]
+        assert np.min(velocity) < 0 < np.max(velocity)
+        assert solution.certificate["lower_bound"] is None
+
+
+def test_coasting_is_not_best_where_braking_earns() -> None:
+    """The load grows heavier on the way: braking it gives back more than speeding it up has taken."""
+    inertia = {"time": [0.0, 0.2, 0.4], "value": [1e-3, 1e-3, 4e-3]}
+    load = {"inertia": inertia, "torque_constant": 0.57, "resistance": 0.1, "recovery": 1.0}
+    ends = {"start": {"velocity": 50.0}, "end": {"velocity": 50.0}}
+    solution = solved(motor("electrical_energy", limits={"acceleration": 200.0}, load=load, **ends))
+    assert solution.objective < -0.1
+
+
 @pytest.mark.parametrize("recovery", [0.0, 0.3, 1.0])
 def test_what_is_drawn_is_lowered_as_it_is_measured(recovery: float) -> None:
     x, weights = np.array([1.0, -2.0, 0.5, -0.1]), np.array([0.1, 0.2, 0.3, 0.4])

@@ -26,7 +26,8 @@ _HOMES = {
         "trajopt.problem",
     ),
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
-    **dict.fromkeys(("Envelope", "Limit", "Table"), "trajopt.fields"),
+    **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
+    "Envelope": "trajopt.envelope",
     **dict.fromkeys(("Norm", "L1", "L2", "Linf"), "norms"),
 }
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from trajopt import units
 from trajopt.attempt import Attempt, Clock, convex
-from trajopt.fields import Envelope, Limit, Table
+from trajopt.envelope import Envelope
+from trajopt.fields import Limit, Table
 from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible

@@ -16,8 +16,8 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, mo
 
 import norms
 from trajopt import units
+from trajopt.envelope import Envelope, read_envelope
 from trajopt.fields import (
-    Envelope,
     Limit,
     Section,
     Table,
@@ -26,7 +26,6 @@ from trajopt.fields import (
     plain,
     positive,
     read_ceiling,
-    read_envelope,
     read_limit,
     read_table,
     refuse_unknown,

@@ -115,8 +115,7 @@ class Quantities:
         ])  # fmt: skip
 
     def ends(self, *names: str) -> list[tuple[Any, ...]]:
-        """Signals by name where force is sampled: at the nodes, or at the left and at the right ends of the intervals.
-        """
+        """Signals by name where force is sampled: at the nodes, or at the left and the right ends of the intervals."""
         found = [self.signal(name) for name in ("force", *names)]
         at_nodes = found[0].nodes is not None
         return list(zip(*(signal.ends(at_nodes) for signal in found[1:]), strict=True))
