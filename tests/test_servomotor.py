@@ -194,6 +194,13 @@ def test_friction_turns_with_the_axis(minimize: str, norm: str | None, limits: d
         assert solution.certificate["lower_bound"] is None
 
 
+@pytest.mark.parametrize("minimize", ["electrical_energy", "copper_loss"])
+def test_standing_still_takes_nothing(minimize: str) -> None:
+    solution = solved(motor(minimize, distance=0.0))
+    assert solution.status is trajopt.Verdict.SOLVED and solution.objective == 0.0
+    assert solution.metrics["copper_loss"] == solution.metrics["electrical_energy"] == 0.0
+
+
 def test_coasting_is_not_best_where_braking_earns() -> None:
     """The load grows heavier on the way: braking it gives back more than speeding it up has taken."""
     inertia = {"time": [0.0, 0.2, 0.4], "value": [1e-3, 1e-3, 4e-3]}

@@ -9,12 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
 from trajopt import motor, signals
 from trajopt.mesh import Mesh
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.scaling import Sizes
 from trajopt.schemes import Scheme
-from trajopt.signals import Signal
+from trajopt.signals import OnFloats, Signal
 
 FORCES: Final = ("force", "current", "voltage", "envelope", "rms_force", "copper_loss")  # affine but for friction
 
@@ -144,7 +146,8 @@ class Quantities:
 
     def _coulomb(self, velocity: Signal) -> Signal:
         coulomb, way = self.problem.load.coulomb, self.problem.one_way
-        if way:
+        stands = isinstance(self.model, OnFloats) and not np.any(velocity.nodes)  # friction holds it, at no cost
+        if way and not stands:
             return signals.constant(way * coulomb, self.mesh.intervals)
         nodes, pieces = self.model.signs(velocity, self.sizes.derivative[1])
         return Signal(coulomb * nodes, tuple(coulomb * piece for piece in pieces) if velocity.pieces else ())
