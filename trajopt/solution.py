@@ -72,7 +72,8 @@ class Solution:
 
     @property
     def frame(self) -> pd.DataFrame:
-        """One row a node: time (s), position, velocity, … (m or rad, and per s), force (N, N m) and power (W).
+        """One row a node: time (s), position, velocity, … (m or rad, and per s), force (N, N m), power (W), and with a
+        motor current (A), voltage (V) and electrical power (W).
 
         The top derivative is the value on the interval that starts at the node; the last row repeats it (exact) or
         is 0 (euler). ``frame.attrs["units"]`` names the unit of each column. Raises NoSolution.
@@ -86,7 +87,8 @@ class Solution:
         return self._moved().at(t)
 
     def plot(self) -> list[Axes]:
-        """Stacked axes of position, velocity, acceleration, jerk and power with their limits. Raises NoSolution."""
+        """Stacked axes of position, velocity, …, power, current with their limits (see `trajopt.plot`). Raises
+        NoSolution."""
         from trajopt.plot import plot
 
         self._moved()

@@ -34,7 +34,7 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
         return _report([*checks, question("structure", str(fault))], False, strict, notes)
     checks.append(question("structure"))
     if case is None:
-        notes.append(f"the verdict {result['status']} (what proves it was checked when it was found, and is not in the file)")
+        notes.append(f"the verdict {result['status']} (its proof was checked when found, and is not in the file)")
         return _report(checks, strict, strict, notes)
     checks += [*time_checks(case), *certificate_checks(case, notes), *vibration_checks(case)]
     decided, rational = decide(case, strict, notes)
