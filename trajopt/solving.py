@@ -11,6 +11,7 @@ import numpy as np
 import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
 from trajopt.conclude import conclude, first_solved
+from trajopt.continuous import findings
 from trajopt.explain import explain_power
 from trajopt.model import Claim, Outcome
 from trajopt.power import descend, linearised, relax
@@ -34,6 +35,18 @@ _LATER = 1e-7  # of a least time
 def solve(problem: Problem, seconds: float | None = None) -> Solution:
     """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only."""
     clock = Clock(seconds)
+    solution = _solve(problem, clock)
+    if solution.trajectory is None:
+        return solution
+    since = perf_counter()
+    certificate, structure = findings(problem, solution.trajectory, solution.metrics)
+    clock.charge("continuous time", since)
+    found = {**solution.certificate, **certificate}
+    return replace(solution, certificate=found, structure={**structure, **solution.structure}, timings=clock.timings())
+
+
+def _solve(problem: Problem, clock: Clock) -> Solution:
+    """The checked answer, or the verdict."""
     chosen = route(problem)
     setting = Setting.of(problem)
     if (still := _coasting(setting)) is not None:
