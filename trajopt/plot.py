@@ -328,8 +328,8 @@ def _mark_arcs(panels: Panels, structure: Mapping[str, Any]) -> None:
     for arc in arcs:
         if arc["to"] - arc["from"] > 0.02 * total:
             middle = (arc["from"] + arc["to"]) / 2
-            named.annotate(arc["name"], (middle, 0.98), xycoords=("data", "axes fraction"), ha="center", va="top",
-                           fontsize=7, color=GREY)  # fmt: skip
+            named.annotate(arc["name"], (middle, 1.0), (0, 2), xycoords=("data", "axes fraction"),
+                           textcoords="offset points", ha="center", va="bottom", fontsize=7, color=GREY)  # fmt: skip
 
 
 def _mark_via(axes: Axes, name: str, trajectory: Trajectory) -> None:

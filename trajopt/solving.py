@@ -24,6 +24,7 @@ from trajopt.switching import Impossible, Unresolved
 from trajopt.switching_times import as_chain, fastest
 from trajopt.ties import break_tie, tied_route
 from trajopt.time_search import minimum_time
+from trajopt.tighten import tighten
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, drawn_in, prescribed, without
 from trajopt.verdict import Verdict
@@ -182,6 +183,8 @@ def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> t
     else:
         at_answer = linearised(lean, answer.trajectory)
         notes = answer.notes | {"starts": 1, "agreed": 1}
+        if setting.problem.transcription.tighten:
+            relaxed = tighten(lean, relaxed, answer.value, clock)
         answer = replace(_priced(at_answer, replace(answer, notes=notes), clock), bound=relaxed.bound)
         candidates.append(break_tie(at_answer, answer, chosen, clock))
     return first_solved(setting, [*candidates, (answer, chosen)], clock, local=True), answer
