@@ -31,6 +31,9 @@ class Section(BaseModel):
 
             raise BadInput(explain(error, type(self))) from None
 
+    # Else pydantic takes it for one that validation must go through, and loses the context (units) on the way.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
 
 def si(value: Any, kind: str, info: ValidationInfo) -> float:
     """One SI number from a float (code) or a text with a unit (file)."""

@@ -29,6 +29,7 @@ from trajopt.plant.polish import (
     sign_margin,
 )
 from trajopt.plant.simulate import end_error
+from trajopt.plant.vibration import mode_pole
 
 _MESHES: Final = (30, 60, 120, 240, 480)
 _REPAIRS: Final = 4
@@ -70,8 +71,8 @@ def time_optimal(
 
     ValueError: one line with a remedy, for input that cannot be met. RuntimeError: no structure was found.
     """
-    u_ss, y_f = _ends(plant, umin, umax, u_ss, y_f)
-    move = _move(plant, umin, umax, u_ss, y_f, _added(plant, robust))
+    u_ss, y_f = ends(plant, umin, umax, u_ss, y_f)
+    move = _move(plant, umin, umax, u_ss, y_f, added_poles(plant, robust))
     best: Candidate | None = None
     start = coarse(move, _MESHES[0], np.empty(0), move.guess())
     for intervals in _MESHES:
@@ -97,7 +98,7 @@ def band(low: float, high: float, damping: float = 0.0, count: int = 3) -> tuple
             f"band: {low:g} to {high:g} rad/s, damping {damping:g}, {count} samples; needs 0 < low <= high, "
             "0 <= damping < 1, at least one sample"
         )
-    return tuple(complex(-damping * w, w * np.sqrt(1 - damping**2)) for w in np.linspace(low, high, count))
+    return tuple(mode_pole(float(w), damping) for w in np.linspace(low, high, count))
 
 
 def _is_better(one: Candidate, other: Candidate) -> bool:
@@ -124,7 +125,7 @@ def _candidates(move: Move, start: Coarse) -> Iterator[Candidate]:
             return
 
 
-def _ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float | None) -> tuple[float, float]:
+def ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float | None) -> tuple[float, float]:
     """The final input and output, each from the other where one is missing; ValueError if they cannot be met."""
     given = [x for x in (umin, umax, u_ss, y_f) if x is not None]
     if not np.all(np.isfinite(given)) or not umin < umax:
@@ -178,8 +179,8 @@ def _check_periods(move: Move, duration: float) -> None:
             )
 
 
-def _added(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex, ...]:
-    """The poles of ``robust`` with their conjugates."""
+def added_poles(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex, ...]:
+    """The poles of ``robust`` (see `time_optimal`) with their conjugates; ValueError if there are none to add."""
     if isinstance(robust, str):
         if robust != "zvd":
             raise ValueError(f'robust: "{robust}"; give "zvd" or a list of poles')
