@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.checker.case import certificate_checks, time_checks
+from trajopt.checker.command import FORMAT, REST, command_checks
 from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
 from trajopt.checker.reading import Malformed, read
@@ -28,6 +29,8 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
     """
     notes: list[str] = []
     checks = _identity(result, problem)
+    if isinstance(result, Mapping) and result.get("format") == FORMAT:
+        return replace(_report([*checks, *command_checks(result, notes)], False, strict, notes), tolerance=REST)
     try:
         case = read(result, notes)
     except Malformed as fault:

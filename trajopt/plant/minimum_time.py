@@ -27,6 +27,7 @@ from trajopt.plant.polish import (
     settle,
     settled_sign,
     sign_margin,
+    without_rounding,
 )
 from trajopt.plant.simulate import end_error
 from trajopt.plant.vibration import mode_pole
@@ -202,7 +203,7 @@ def _move(plant: Plant, umin: float, umax: float, u_ss: float, y_f: float, added
 
 
 def _command(plant: Plant, move: Move, best: Candidate, umin: float, umax: float, u_ss: float, y_f: float) -> Command:
-    structure, duration = best.structure, best.duration
+    structure, duration = without_rounding(best.structure), best.duration
     switches = tuple(float(x) for x in duration - structure.h[1:] * best.horizon)
     up = structure.sign * (-1.0) ** np.arange(len(structure.h)) > 0
     levels = tuple(umax if x else umin for x in up)
