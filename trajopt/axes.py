@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def synchronise(
-    problems: Sequence[Problem | PlantProblem], seconds: float | None = None, solve: Callable[..., Solution] = worker.solve
+    problems: Sequence[Problem | PlantProblem],
+    seconds: float | None = None,
+    solve: Callable[..., Solution] = worker.solve,
 ) -> list[Solution]:
     """One solution an axis, all of one duration (s): the least time of the slowest.
 

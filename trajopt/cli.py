@@ -43,13 +43,12 @@ def solve(
 ) -> None:
     """Solve a problem; exits 0 only with a checked answer."""
     from trajopt import preflight, problem_file
-    from trajopt.problem import Problem
     from trajopt.worker import solve_apart
 
     _refuse_seconds(seconds)
     problem = problem_file.load(source, overrides)
     _make_folder(output)
-    for warning in preflight.warnings(problem) if isinstance(problem, Problem) else ():
+    for warning in preflight.warnings(problem):
         print(f"warning: {warning}", file=sys.stderr)
     solution = solve_apart(problem, seconds)
     written = solution.save(output) if output is not None else []

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from trajopt import units
 from trajopt.fields import Limit
 from trajopt.problem import DERIVATIVES, MOST_INTERVALS, Problem, State
+
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
 
 SYMBOLS: Final = ("q", "v", "a", "j", "s")
 CLAMPED = 1e-9  # a boundary state outside its limit by this fraction of the limit is a rounding, not a contradiction
@@ -26,8 +29,11 @@ def refuse_contradictions(problem: Problem) -> None:
     _doomed(problem)
 
 
-def warnings(problem: Problem) -> list[str]:
-    """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk."""
+def warnings(problem: Problem | PlantProblem) -> list[str]:
+    """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk. The
+    plain numbers of a plant give none away."""
+    if not isinstance(problem, Problem):
+        return []
     return [*_clamped(problem), *_wrong_units(problem), *_coarse(problem), *_heavy(problem)]
 
 

@@ -90,7 +90,7 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
 
     for key in ("move", "limits", "load", "vibration", "objective", "transcription", "rotary"):
         if key in data:
-            raise _refused(name, f"{key}: belongs to the move of an axis, not beside [plant]; leave one of them out")
+            raise _refused(name, f"{key}: belongs to an axis and cannot stand beside [plant]; leave one of them out")
     try:
         return PlantProblem.model_validate(data, context={"texts_only": True})
     except ValidationError as error:
@@ -324,7 +324,7 @@ def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
         if model is None:
             return []
     aliases = _ALIASES.get(str(loc[-1]), {}) if loc else {}
-    extra = ["minimize", "norm", "weight"] if model is p.Objective else []
+    extra = ["minimize", "norm", "weight"] if model is p.Objective else ["plant"] if model is p.Problem else []
     return [*model.model_fields, *aliases, *extra]
 
 

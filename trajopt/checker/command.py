@@ -15,7 +15,9 @@ sum of its terms; the bound 1e-6.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -25,14 +27,16 @@ from trajopt.checker.command_reading import FORMAT, Commanded, read_command
 from trajopt.checker.linear_system import System, chain, series
 from trajopt.checker.reading import Malformed
 from trajopt.checker.report import Check, question
+from trajopt.checker.result_file import _text as read_text
 
-__all__ = ["FORMAT", "command_bound", "command_checks"]
+__all__ = ["FORMAT", "REST", "command_bound", "command_checks", "steps_checks"]
 REST: Final = 1e-6
 _SIGN: Final = 1e-7
 _GAP: Final = 1e-6
 _CLAIM: Final = 1e-9
 _TIME: Final = 1e-12
 _VALUE: Final = 1e-6
+_PRINTED: Final = 1e-15
 _NULL: Final = 1e-8  # of the largest: singular values below it are zero
 _ARC: Final = 40  # samples of sigma an arc, at least
 _MOST: Final = 20_000  # samples of sigma in all
@@ -62,6 +66,30 @@ def command_bound(result: Mapping[str, Any]) -> float | None:
     except (Malformed, np.linalg.LinAlgError):
         return None
     return None if proof is None else proof[1]
+
+
+def steps_checks(path: Path, result: Mapping[str, Any]) -> list[Check]:
+    """Whether a command.csv beside a result.json says the same: a row a jump of the input, its time and the level."""
+    table = path.with_name("command.csv")
+    if path.name != "result.json" or not os.path.lexists(table):
+        return []
+    try:
+        with np.errstate(all="ignore"):
+            x = read_command(result, [])
+        rows = [row for row in read_text(table).splitlines() if row and not row.startswith("#")]
+        cells = [row.split(",") for row in rows]
+        given = np.array([[float(cell) for cell in row] for row in cells[1:]])
+    except (ValueError, RecursionError) as error:
+        return [question("command.csv", f"cannot be compared: {error}")]
+    if x is None:
+        return [question("command.csv", "carries numbers although the result is no solution")]
+    expected = np.column_stack([x.time, [*x.levels, x.final_input]])
+    fault = "" if cells[:1] == [["t [s]", "u"]] else "its header is not t [s],u"
+    if given.shape != expected.shape:
+        fault = f"has {len(given)} rows where {len(expected)} belong"
+    elif not np.all(np.abs(given - expected) <= _PRINTED * np.abs(expected)):
+        fault = "has other numbers than the result"
+    return [question("command.csv", fault)]
 
 
 def _of_the_command(x: Commanded) -> list[Check]:

@@ -144,9 +144,13 @@ def ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float 
     assert u_ss is not None
     y_f = u_ss * plant.limit if y_f is None else y_f
     if not plant.rigid and abs(y_f - u_ss * plant.limit) > _MATCH * max(abs(y_f), abs(u_ss * plant.limit)):
-        raise ValueError(f"u_ss: {u_ss:g} holds y = {u_ss * plant.limit:g}, not y_f = {y_f:g}; leave one of them out")
+        held = u_ss * plant.limit
+        raise ValueError(f"u_ss: {u_ss:g} holds y = {held:g}, not y_f = {y_f:g}; correct it or leave it out")
     if not umin <= u_ss <= umax:
-        raise ValueError(f"u_ss: {u_ss:g} is outside the input limits {umin:g} to {umax:g}; widen them or move less")
+        raise ValueError(
+            f"u_ss: {u_ss:g}, which holds y_f = {y_f:g}, is outside the input limits {umin:g} to {umax:g}; "
+            "widen them or move less"
+        )
     if not (y_f if plant.rigid else u_ss):
         raise ValueError("y_f: a move of zero length needs no command; give a final value other than zero")
     _check_reach(plant, umin, umax, u_ss, y_f)
@@ -191,8 +195,8 @@ def added_poles(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex,
         return added
     upper = [complex(p) for p in robust]
     conjugates = [p.conjugate() for p in upper if p.imag and upper.count(p.conjugate()) < upper.count(p)]
-    if not np.all(np.isfinite(upper)) or 0 in upper:
-        raise ValueError("robust: poles must be finite and not zero")
+    if not np.all(np.isfinite(upper)) or 0 in upper or any(p.real > 0 for p in upper):
+        raise ValueError("robust: poles must be finite, not zero and not unstable (real part above zero)")
     return settled([*upper, *conjugates], GIVEN)
 
 

@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
 from math import isfinite, pi
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -29,7 +28,7 @@ MOST: Final = 20  # states, and samples of a band
 _FORMS: Final = (("numerator", "denominator"), ("poles", "zeros", "gain"), ("A", "B", "C", "D"))
 _NEEDED: Final = (("numerator", "denominator"), ("poles",), ("A", "B", "C"))
 _DESCRIBE: Final = "give numerator and denominator, or poles, zeros and gain, or A, B, C and D"
-_NAMES: Final = {"u_ss": "final_input", "y_f": "final_value", "input limits": "input", "umin < umax": "min < max"}
+_NAMES: Final = {"u_ss": "final_input", "y_f": "final_value", "input limits:": "input:", "umin < umax": "min < max"}
 
 
 def _number(value: Any) -> float:
@@ -55,7 +54,7 @@ def _listed(value: Any, what: str) -> list[Any]:
 def _row(value: Any) -> tuple[float, ...] | None:
     if value is None:
         return None
-    values = _listed(value, "it")
+    values = _listed(value, "the value")
     if len(values) == 1 and isinstance(values[0], list | tuple | np.ndarray):  # a matrix of one row
         values = _listed(values[0], "its row")
     return tuple(_number(x[0] if isinstance(x, list | tuple | np.ndarray) and len(x) == 1 else x) for x in values)
@@ -64,7 +63,7 @@ def _row(value: Any) -> tuple[float, ...] | None:
 def _matrix(value: Any) -> tuple[tuple[float, ...], ...] | None:
     if value is None:
         return None
-    rows = [tuple(_number(x) for x in _listed(row, "a row")) for row in _listed(value, "it")]
+    rows = [tuple(_number(x) for x in _listed(row, "a row")) for row in _listed(value, "the value")]
     if not rows or any(len(row) != len(rows) for row in rows):
         raise ValueError(f"must be square, as many rows as columns, got rows of {[len(row) for row in rows]}")
     return tuple(rows)
@@ -74,7 +73,7 @@ def _roots(value: Any) -> tuple[complex, ...] | None:
     """Complex numbers from numbers and pairs [re, im], with the conjugates that were left out."""
     if value is None:
         return None
-    found = [_root(x) for x in _listed(value, "it")]
+    found = [_root(x) for x in _listed(value, "the value")]
     missing = []
     for x in dict.fromkeys(found):
         missing += [x.conjugate()] * (found.count(x) - found.count(x.conjugate()))
@@ -113,7 +112,7 @@ def _input(value: Any) -> tuple[float, float]:
 def _band(value: Any, info: ValidationInfo) -> tuple[float, float] | None:
     if value is None:
         return None
-    found = [si(x, "frequency", info) for x in sequence(value, "it")]
+    found = [si(x, "frequency", info) for x in sequence(value, "the value")]
     if len(found) != 2 or not 0 < found[0] <= found[1]:
         raise ValueError(f'needs a pair of frequencies such as ["7 Hz", "9 Hz"], 0 < min <= max, got {shown(value)}')
     return found[0], found[1]
@@ -149,7 +148,7 @@ class Robust(Section):
     def _one(self) -> Self:
         if (self.band is None) == (not self.poles):
             raise ValueError('give either band = ["7 Hz", "9 Hz"] or poles = [[-0.1, 50.0]]')
-        if self.poles and self.model_fields_set & {"damping", "count"}:
+        if self.poles and (self.damping, self.count) != (0.0, 3):
             raise ValueError("damping and count belong to a band; leave them out beside poles")
         return self
 
@@ -203,8 +202,9 @@ class PlantSection(Section):
             if getattr(self, key) is None:
                 raise ValueError(f"{key}: is missing; {_DESCRIBE}")
         with translated():
-            ends(self.model, *self.input, self.final_input, self.final_value)
-            added_poles(self.model, self.added)
+            plant = self.model
+            ends(plant, *self.input, self.final_input, self.final_value)
+            added_poles(plant, self.added)
         return self
 
     @property
@@ -212,7 +212,7 @@ class PlantSection(Section):
         """What robustness adds, as `time_optimal` takes it."""
         return "zvd" if self.robust == "zvd" else () if self.robust is None else self.robust.added
 
-    @cached_property
+    @property
     def model(self) -> Plant:
         """The plant. Raises BadInput."""
         with translated():
