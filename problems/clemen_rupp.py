@@ -79,7 +79,7 @@ def study(solutions: Mapping[Case, Solution]) -> pd.DataFrame:
     """
     table = pd.DataFrame(index=pd.Index(list(PRINTED), name="case"))
     table["minimised"] = [printed.label for printed in PRINTED.values()]
-    table["determined"] = [solutions[name, "euler"].route.unique for name in PRINTED]
+    table["determined"] = [solutions[name, "euler"].route.unique is not False for name in PRINTED]
     for quantity, metric in (("energy", "energy"), ("power", "peak_power")):
         for scheme in SCHEMES:
             column = f"{quantity}_{scheme}"

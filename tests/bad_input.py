@@ -42,6 +42,25 @@ inertia = "4e-4 kg m^2"
 [objective]
 minimize = "energy"
 """
+MOTOR: Final = """
+[move]
+time = "0.4 s"
+end = { position = "5 rad" }
+
+[limits]
+velocity = ["0 rad/s", "100 rad/s"]
+acceleration = "275 rad/s^2"
+
+[load]
+inertia = "4.142e-4 kg m^2"
+coulomb = "0.02 N m"
+viscous = "2e-4 N m s/rad"
+torque_constant = "0.57 N m/A"
+resistance = "3 ohm"
+
+[objective]
+minimize = "electrical_energy"
+"""
 
 
 @dataclass(frozen=True)
@@ -101,6 +120,16 @@ FIELDS: Final = (
     Field("limits.torque", "N m", "N", text=ROTARY),
     Field("load.inertia", "kg m^2", "A", text=ROTARY),
     Field("load.viscous", "N m s/rad", "N s/m", zero=True, text=ROTARY),
+    Field("limits.current", "A", "V", text=MOTOR),
+    Field("limits.voltage", "V", "A", text=MOTOR),
+    Field("load.torque_constant", "N m/A", "N/A", text=MOTOR),
+    Field("load.force_constant", "N/A", "N m/A"),
+    Field("load.resistance", "ohm", "A", text=MOTOR),
+    Field("load.switching", "W/A", "W", zero=True, text=MOTOR),
+    Field("load.eddy", "ohm s^2", "ohm", zero=True, text=MOTOR),
+    Field("load.eddy", "W s^2/m^2/A^2", "ohm s^2", zero=True),
+    Field("load.hysteresis", "W s/rad", "W", zero=True, text=MOTOR),
+    Field("load.hysteresis", "W s/m", "W s", zero=True),
 )
 
 
@@ -289,6 +318,97 @@ def _objective() -> Iterator[Bad]:
         where = "objective.terms[1]."
         other = '{minimize="jerk", norm="l2"}'
         yield _set(f"term-{name}", f"objective.terms=[{other}, {term}]", words=(where + first, *rest))
+
+
+def _motor() -> Iterator[Bad]:
+    for key in ("torque_constant", "resistance"):
+        text = "\n".join(line for line in MOTOR.splitlines() if not line.startswith(key))
+        words = (f"load.{key}: is missing", "needs it", f"write {key} =")
+        yield Bad(f"motor-without-{key}", words, text)
+    no_motor = MOTOR[: MOTOR.index("torque_constant")] + '[objective]\nminimize="jerk"\nnorm="l2"\n'
+    for key, value in (
+        ("limits.current", "1 A"), ("limits.voltage", "10 V"), ("limits.brake_energy", "1 J"),
+        ("load.eddy", "1 ohm s^2"), ("load.switching", "4 W/A"), ("load.recovery", "0.5"),
+        ("load.hysteresis_exponent", "1.5"), ("load.resistance", "3 ohm"), ("objective.minimize", "current"),
+    ):  # fmt: skip
+        words = ("load.torque_constant: is missing", "needs it", 'write torque_constant = "0.57 N m/A"')
+        yield _set(f"no-motor-{key}", f"{key}={value}", words=words, text=no_motor)
+    yield _set("envelope-without-mass", 'limits.envelope={speed=["0 m/s","1 m/s"], force=["9 N","8 N"]}',
+               words=("load.mass: is missing", "limits.envelope needs it"), text=_without("load"))  # fmt: skip
+    twice = 'load={force_constant="40 N/A", torque_constant="40 N/A", resistance="1 ohm", mass="1 kg"}'
+    yield _set("both-constants", twice, words=("load.force_constant: give force_constant or torque_constant",))
+    twice = 'limits={rms_force="1 N", rms_torque="1 N"}'
+    yield _set("both-rms", twice, words=("limits.rms_torque: give rms_torque or rms_force",))
+    for value in ("1", "1.0", "2.001", "-1.5", "nan"):
+        words = ("load.hysteresis_exponent: must be above 1 and at most 2", f"got {value}"[:5])
+        yield _set(f"exponent-{value}", f"load.hysteresis_exponent={value}", words=words, text=MOTOR)
+    for value in ("-0.1", "1.1", "inf"):
+        yield _set(f"recovery-{value}", f"load.recovery={value}", words=("load.recovery: must be 0 to 1",), text=MOTOR)
+    for key in ("recovery", "hysteresis_exponent"):
+        for value in ('"50 %"', "true", "[1]"):
+            words = (f"load.{key}: must be a plain number",)
+            yield _set(f"{key}-{value}", f"load.{key}={value}", words=words, text=MOTOR)
+    yield _set("dwell-negative", "move.dwell=-1 s", words=("move.dwell: must be 0 or more",), text=MOTOR)
+    yield _set("dwell-metres", "move.dwell=1 m", words=("move.dwell", "a time is needed"), text=MOTOR)
+    yield _set("dwell-elsewhere", "limits.dwell=1 s", words=("limits.dwell: unknown key", "[move]"), text=MOTOR)
+    yield _set("envelope-elsewhere", "load.envelope={}", words=("load.envelope: unknown key", "[limits]"), text=MOTOR)
+    for name, unit in (("rms_torque", "N m"), ("brake_energy", "J")):
+        for value, words in (
+            (f"0 {unit}", ("must be > 0",)), (f"-1 {unit}", ("must be > 0",)), ("1 kg", ("is needed",)),
+            ("3", ("no unit",)), (f'["1 {unit}", "2 {unit}"]', ("is not a",)), ("{}", ("is not a",)),
+        ):  # fmt: skip
+            yield _set(f"{name}-{value}", f"limits.{name}={value}", words=(f"limits.{name}", *words), text=MOTOR)
+    for name, speed, torque, words in (
+        ("rises", '"0 rpm", "99 rpm"', '"1 N m", "2 N m"', ("must not increase with the speed",)),
+        ("bends", '"0 rpm", "50 rpm", "99 rpm"', '"2 N m", "0.5 N m", "0.4 N m"', ("bends inwards",)),
+        ("moving", '"1 rpm", "99 rpm"', '"2 N m", "1 N m"', ("must start at standstill",)),
+        ("back", '"0 rpm", "99 rpm", "50 rpm"', '"2 N m", "1 N m", "1 N m"', ("speed: must increase",)),
+        ("powerless", '"0 rpm", "99 rpm"', '"0 N m", "0 N m"', ("must be > 0 at standstill",)),
+        ("negative", '"0 rpm", "99 rpm"', '"1 N m", "-1 N m"', ("nowhere negative",)),
+        ("short", '"0 rpm", "99 rpm"', '"1 N m"', ("as many torques as speeds", "2 speeds, 1 torques")),
+        ("single", '"0 rpm"', '"1 N m"', ("at least two",)),
+        ("units", '"0 V", "99 V"', '"1 N m", "1 N m"', ("a velocity is needed",)),
+        ("bare", "0, 99", '"1 N m", "1 N m"', ("no unit",)),
+    ):
+        value = f"limits.envelope={{speed=[{speed}], torque=[{torque}]}}"
+        yield _set(f"envelope-{name}", value, words=("limits.envelope", *words), text=MOTOR)
+    for name, value, words in (
+        ("number", "3", ("must be {",)), ("empty", "{}", ("speed: is missing",)),
+        ("no-torque", '{speed=["0 rpm", "1 rpm"]}', ("torque: is missing",)),
+        ("key", '{speeds=["0 rpm"]}', ("unknown key 'speeds'", "did you mean 'speed'")),
+    ):  # fmt: skip
+        yield _set(f"envelope-{name}", f"limits.envelope={value}", words=("limits.envelope", *words), text=MOTOR)
+
+
+def _weak_motor() -> Iterator[Bad]:
+    """A motor that cannot do what is asked, by numbers: friction 0.02 N m and 2e-4 N m s, mean speed 12.5 rad/s."""
+    yield _set("stiction", "limits.current=35 mA", words=("limits.current", "0.01995 N m", "cannot move"), text=MOTOR)
+    yield _set("stiction-back", 'limits.current=["-35 mA","9 A"]', "move.end.position=-5 rad",
+               'limits.velocity=["-100 rad/s","0 rad/s"]', words=("limits.current", "cannot move"),
+               text=MOTOR)  # fmt: skip
+    yield _set("stiction-voltage", "limits.voltage=0.1 V", words=("limits.voltage", "cannot move the load"), text=MOTOR)
+    weak = 'limits.envelope={speed=["0 rad/s","99 rad/s"], torque=["0.019 N m","0.01 N m"]}'
+    yield _set("stiction-envelope", weak, words=("limits.envelope", "cannot move the load"), text=MOTOR)
+    words: tuple[str, ...] = ("limits.voltage: is too low for the mean speed of the move, 12.5 rad/s", "7.24342 V")
+    yield _set("voltage", "limits.voltage=7.2 V", words=words, text=MOTOR)
+    words = ("limits.voltage: is too low for the mean speed of the move, 6.25 rad/s",)
+    longest = 'move.time=["0.4 s","0.8 s"]'
+    yield _set("voltage-longest", "limits.voltage=3.6 V", longest, words=words, text=MOTOR)
+    fast = ("move.start.velocity=30 rad/s", "move.end.velocity=30 rad/s", 'limits.velocity=["20 rad/s","100 rad/s"]',
+            "move.end.position=15 rad", "move.time=0.5 s")  # fmt: skip
+    words = ("limits.voltage: is too low for the least speed of limits.velocity, 20 rad/s",)
+    yield _set("voltage-least-speed", "limits.voltage=11 V", *fast, words=words, text=MOTOR)
+    slow = 'limits.envelope={speed=["0 rad/s","12 rad/s"], torque=["1 N m","1 N m"]}'
+    words = ("limits.envelope: ends at 12 rad/s, below the mean speed of the move, 12.5 rad/s",)
+    yield _set("envelope-ends", slow, words=words, text=MOTOR)
+    falling = 'limits.envelope={speed=["0 rad/s","13 rad/s"], torque=["0.5 N m","0 N m"]}'
+    words = ("limits.envelope: leaves 0.0192308 N m at the mean speed", "friction takes 0.0225 N m")
+    yield _set("envelope-falls", falling, words=words, text=MOTOR)
+    beyond = 'limits.envelope={speed=["0 rad/s","20 rad/s"], torque=["0.5 N m","0.5 N m"]}'
+    words = ("move.start.velocity: 30 rad/s is beyond limits.envelope", "20 rad/s")
+    yield _set("envelope-start", beyond, "move.start.velocity=30 rad/s", words=words, text=MOTOR)
+    words = ("limits.current: gives the motor at most 89.3288 rad/s^2", "move.time is 0.4 s")
+    yield _set("slow", "limits.current=0.1 A", words=words, text=MOTOR)
 
 
 def _contradictions() -> Iterator[Bad]:
@@ -495,6 +615,8 @@ CASES: Final = (
     *_by_key(),
     *_transcription(),
     *_objective(),
+    *_motor(),
+    *_weak_motor(),
     *_contradictions(),
     *_overrides(),
     *_texts(),

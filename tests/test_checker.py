@@ -23,6 +23,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import trajopt
 from trajopt import checker
 from trajopt.checker import CheckerInputError, check, check_file, measure, result_file
 from trajopt.checker.float_twin import FloatTwin
@@ -79,7 +80,21 @@ def sampled(data: Data, per: int = 4001) -> tuple[Any, dict[str, Any]]:
         signals["force"] = table_at(load["inertia"], t) * signals["acceleration"] + load.get("viscous", 0.0) * v
         signals["force"] = signals["force"] + load.get("coulomb", 0.0) * sign
         signals["power"] = signals["force"] * v
+    if load.get("torque_constant") is not None:
+        signals |= electrical(load, signals["force"], signals["velocity"])
     return t, signals
+
+
+def electrical(load: Data, force: Any, v: Any) -> dict[str, Any]:
+    """Current, voltage, and the power that a motor draws."""
+    u = force / load["torque_constant"]
+    iron = load["eddy"] * v**2 * u**2 + load["hysteresis"] * np.abs(v) * np.abs(u) ** load["hysteresis_exponent"]
+    drawn = force * v + load["resistance"] * u**2 + load["switching"] * np.abs(u) + iron
+    return {"current": u, "voltage": load["resistance"] * u + load["torque_constant"] * v, "drawn": drawn}
+
+
+def counted(load: Data, drawn: Any) -> Any:
+    return np.where(drawn > 0, drawn, load["recovery"] * drawn)
 
 
 def stretches(time: Any, x: list[Any]) -> tuple[Any, Any, Any]:
@@ -100,7 +115,7 @@ def metrics_of(data: Data) -> dict[str, float]:
     end = data["trajectory"]["time"][-1]
     euler_step = end / (t.size - 1) if data["trajectory"]["scheme"] == "euler" else None
     found = {}
-    for name in (*NAMES[1 : data["trajectory"]["order"] + 1], "force", "power"):
+    for name in (*NAMES[1 : data["trajectory"]["order"] + 1], "force", "power", "current"):
         if name in signals:
             x = signals[name]
             found[f"peak_{name}"] = float(np.max(np.abs(x)))
@@ -109,6 +124,12 @@ def metrics_of(data: Data) -> dict[str, float]:
             found[f"rms_{name}"] = math.sqrt(total / end)
     if "power" in signals:
         found["energy"] = float(np.trapezoid(np.abs(signals["power"]), t).sum())
+    if "drawn" in signals:
+        load = data["problem"]["load"]
+        found["peak_voltage"] = float(np.max(np.abs(signals["voltage"])))
+        found["copper_loss"] = load["resistance"] * found["rms_current"] ** 2 * end
+        found["electrical_energy"] = float(np.trapezoid(counted(load, signals["drawn"]), t).sum())
+        found["brake_energy"] = float(np.trapezoid(np.maximum(-signals["drawn"], 0.0), t).sum())
     speed = np.abs(signals["velocity"])
     found["distance"] = float(speed[0, :-1].sum() * euler_step if euler_step else np.trapezoid(speed, t).sum())
     return found
@@ -172,6 +193,9 @@ def s_curve(count: int = 16, distance: float = 0.254, span: float = 1.0, **more:
 LOAD = {"inertia": 10.0, "coulomb": 0.0, "viscous": 0.0}
 RUB = {"inertia": 10.0, "coulomb": 3.0, "viscous": 2.0}
 GROWING = {"inertia": {"time": [0.0, 0.25, 1.0], "value": [5.0, 10.0, 6.0]}, "coulomb": 1.0, "viscous": 0.5}
+MOTOR = {**RUB, "torque_constant": 20.0, "resistance": 0.7, "switching": 0.4, "eddy": 0.5, "hysteresis": 0.3,
+         "hysteresis_exponent": 2.0, "recovery": 0.6}  # fmt: skip
+IRON = {**MOTOR, "hysteresis_exponent": 1.6, "recovery": 0.0}
 UNEVEN = [0.0, 0.1, 0.25, 0.3, 0.45, 0.5, 0.6, 0.75, 0.8, 0.9, 1.0]
 WAVE = [3.0, -7.0, 2.0, -1.0, 5.0, -4.0, 3.0, 6.0, -8.0, 1.0]
 
@@ -187,6 +211,11 @@ RIGHT: dict[str, Callable[[], Data]] = {
     "euler": lambda: result(WAVE, scheme="euler", load=RUB, start=[0.1, 0.2 / 3, -0.3 / 7]),
     "euler snap": lambda: result(WAVE, 4, scheme="euler", load=LOAD),
     "no load": lambda: result(WAVE),
+    "motor": lambda: s_curve(load=MOTOR),
+    "motor reversing": lambda: result([40.0, -80.0, 30.0, -50.0, 70.0, -10.0], load=IRON),
+    "motor order 2": lambda: result([2 / 3, 1 / 3, -1 / 3, -2 / 3], 2, load=MOTOR),
+    "motor order 4": lambda: result(WAVE, 4, load={**MOTOR, "coulomb": 0.0}, start=[0.0, 0.2, -0.1, 0.3]),
+    "motor euler": lambda: result(WAVE, scheme="euler", load=IRON, start=[0.1, 0.2 / 3, -0.3 / 7]),
 }  # fmt: skip
 
 
@@ -336,7 +365,7 @@ def test_missing_keys_and_unknown_words_are_caught() -> None:
         assert not check({**data, key: None}).passed or key == "trajopt"
     for changed in ({"status": "solved"}, {"status": ["SOLVED"]}, {"format": "trajopt result 2"}, {"objective": True}):
         assert not check({**data, **changed}).passed
-    for section, extra in (("limits", {"torque": {"max": 1.0}}), ("load", {"gravity": 9.81}), ("move", {"dwell": 1.0})):
+    for section, extra in (("limits", {"torque": {"max": 1.0}}), ("load", {"gravity": 9.81}), ("move", {"pause": 1.0})):
         odd = copy.deepcopy(data)
         odd["problem"][section].update(extra)
         assert "does not know" in check(sealed(odd)).failed[0].note
@@ -434,6 +463,65 @@ def test_power_between_the_nodes() -> None:
         assert check(data).passed is right and check(data, strict=factor > 1).passed is right
 
 
+def test_limits_of_a_motor() -> None:
+    """Each at the edge, by its definition; and 1e-5 of it beyond."""
+    plain = s_curve(load=MOTOR)
+    t, signals = sampled(plain)
+    found = plain["metrics"]
+    dwell = 0.6
+    cases = {
+        "current": {"min": -found["peak_current"], "max": found["peak_current"]},
+        "voltage": {"max": float(np.max(signals["voltage"]))},
+        "rms_force": {"max": found["rms_force"] * math.sqrt(1 / (1 + dwell))},
+        "brake_energy": {"max": found["brake_energy"]},
+    }
+    for name, limit in cases.items():
+        for factor, right in ((1 + 3e-7, True), (1 - 1e-5, False)):
+            data = s_curve(load=MOTOR, limits={name: {side: x * factor for side, x in limit.items()}})
+            data["problem"]["move"]["dwell"] = dwell
+            for strict in (False, True) if factor > 1 else (False,):
+                report = check(sealed(data), strict=strict)
+                assert {failed.name for failed in report.failed} == (set() if right else {f"limit {name}"})
+    data["problem"]["limits"]["rms_force"] = cases["rms_force"]
+    data["problem"]["move"]["dwell"] = 0.99 * dwell
+    assert "limit rms_force" in {failed.name for failed in check(sealed(data)).failed}
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_envelope_holds_between_the_nodes_and_in_every_quadrant(way: float) -> None:
+    """Force 10 - 20 t and velocity 0.5 + t - t²: the highest of plus-minus force + 12·velocity, by sampling."""
+    t = np.linspace(0, 1, 100001)
+    v, force = 0.5 + t - t**2, 10 - 20 * t
+    level = max(float(np.max(force + 12 * v)), float(np.max(-force + 12 * v)))
+    for factor, right in ((1 + 1e-8, True), (1 - 1e-5, False)):
+        # forces fall by 12 N per m/s from `level` down to the last speed, 1 m/s
+        envelope = {"speed": [0.0, 1.0], "force": [level * factor, level * factor - 12]}
+        data = result([-2.0 * way], start=[0.0, 0.5 * way, way], limits={"envelope": envelope}, load=LOAD)
+        assert check(data).passed is right and check(data, strict=factor > 1).passed is right
+    for last, right in ((0.75, True), (0.74, False)):
+        envelope = {"speed": [0.0, last], "force": [30.0, 30.0]}
+        data = result([-2.0 * way], start=[0.0, 0.5 * way, way], limits={"envelope": envelope}, load=LOAD)
+        assert check(data).passed is right
+
+
+def test_what_is_no_motor_is_said() -> None:
+    for change, word in (
+        ({"torque_constant": None}, "torque_constant"), ({"resistance": 0.0}, "resistance"),
+        ({"eddy": -1.0}, "negative"), ({"hysteresis_exponent": 1.0}, "hysteresis_exponent"),
+        ({"recovery": 1.1}, "recovery"), ({"gears": 2}, "gears"),
+    ):  # fmt: skip
+        data = s_curve(load=MOTOR)
+        data["problem"]["load"].update(change)
+        assert word in check(sealed(data)).summary()
+    for limit in ({"current": {"max": 1.0}}, {"brake_energy": {"max": 1.0}}):
+        assert "torque_constant" in check(s_curve(load=LOAD, limits=limit)).summary()
+    for envelope in ({"speed": [0.0, 1.0], "force": [1.0, 2.0]}, {"speed": [0.1, 1.0], "force": [2.0, 1.0]},
+                     {"speed": [0.0], "force": [1.0]}, {"speed": [0.0, 0.0], "force": [2.0, 1.0]}, 5):  # fmt: skip
+        assert "envelope" in check(s_curve(load=LOAD, limits={"envelope": envelope})).summary()
+    for limit in ({"min": 0.0}, {"max": {"time": [0.0, 1.0], "value": [1.0, 2.0]}}):
+        assert "rms_force" in check(s_curve(load=LOAD, limits={"rms_force": limit})).summary()
+
+
 def test_position_limits_between_the_nodes() -> None:
     for level, right in ((0.125, True), (0.125 - 1e-6, False)):
         data = result([-1.0, 1.0, 1.0], 2, start=[0.0, 0.5], limits={"position": {"min": -1.0, "max": level}},
@@ -527,10 +615,10 @@ def value_of(data: Data, term: Data) -> float:
     if name == "time":
         return float(time[-1])
     x = [np.array(found[key]) for key in NAMES[: order + 1]]
-    quantity = "power" if name == "energy" else name
+    quantity = {"energy": "power", "copper_loss": "current", "electrical_energy": "drawn"}.get(name, name)
     weights = np.append(steps, 0) / 2 + np.append(0, steps) / 2
     pick: Callable[[Any], Any] = lambda y: y  # noqa: E731
-    if quantity in ("force", "power") and order == 2:
+    if quantity not in NAMES and order == 2:
         weights = np.tile(steps / 2, 2)
         pick = lambda y: np.concatenate([y[:-1], y[1:]]) if len(y) > len(steps) else np.tile(y, 2)  # noqa: E731
     if quantity in NAMES:
@@ -539,21 +627,30 @@ def value_of(data: Data, term: Data) -> float:
     else:
         v = pick(x[1])
         y = pick(table_at(load["inertia"], time)) * pick(x[2]) + load["viscous"] * v + load["coulomb"] * np.sign(v)
+        if quantity in ("current", "voltage", "drawn"):
+            y = electrical(load, y, v)[quantity]
         y = y * v if quantity == "power" else y
     if euler:
-        weights = np.full(len(y), steps[0] if name == "energy" else 1.0)
+        weights = np.full(len(y), steps[0] if "norm" not in term else 1.0)
+    if name == "copper_loss":
+        return float(weights @ (load["resistance"] * y**2))
+    if name == "electrical_energy":
+        return float(weights @ counted(load, y))
     norm = term.get("norm", "l1")
     if norm == "linf":
         return float(np.max(np.abs(y)))
     return float(weights @ np.abs(y) if norm == "l1" else math.sqrt(weights @ y**2 / (1 if euler else time[-1])))
 
 
-@pytest.mark.parametrize("name", ["s-curve", "friction", "growing load", "order 2", "order 4", "euler", "uneven"])
+@pytest.mark.parametrize("name", [name for name in RIGHT if name not in ("reversing", "euler snap", "no load")])
 def test_objectives_by_definition(name: str) -> None:
     data = RIGHT[name]()
     below = NAMES[: data["trajectory"]["order"] + 1]
-    terms = [{"minimize": key, "norm": norm} for key in (*below, "force", "power") for norm in ("l1", "l2", "linf")]
-    terms += [{"minimize": "energy"}, {"minimize": "time"}]
+    motor = name.startswith("motor")
+    normed = (*below, "force", "power", *(("current", "voltage") if motor else ()))
+    terms = [{"minimize": key, "norm": norm} for key in normed for norm in ("l1", "l2", "linf")]
+    plain = ("energy", "time", *(("copper_loss", "electrical_energy") if motor else ()))
+    terms += [{"minimize": key} for key in plain]
     # the order is that of the problem: its states say so where the term does not
     alone = [[{**term, "weight": 2.0}] for term in terms]
     for chosen in [*alone, [{**term, "weight": 0.1 + k} for k, term in enumerate(terms)]]:
@@ -616,9 +713,17 @@ def random_case(seed: int) -> Data:
     inertia = {"time": [0.3 * clock, 0.6 * clock], "value": [dice.uniform(1, 9), dice.uniform(1, 9)]}
     load = {"inertia": dice.choice([2.0, inertia]), "viscous": dice.choice([0.0, 1.0 / clock]),
             "coulomb": dice.choice([0.0, size / clock**2])}  # fmt: skip
+    if dice.random() < 0.5:
+        speed, watt = size / clock, size**2 / clock**3
+        load |= {"torque_constant": dice.uniform(1, 9) * size / clock**2, "resistance": dice.uniform(0.1, 9) * watt,
+                 "switching": dice.choice([0.0, watt]), "eddy": dice.choice([0.0, watt / speed**2]),
+                 "hysteresis": dice.choice([0.0, watt / speed]), "hysteresis_exponent": dice.choice([1.3, 2.0]),
+                 "recovery": dice.choice([0.0, 0.7, 1.0])}  # fmt: skip
     data = result(top, order, scheme, times, start, load=load)
     _, signals = sampled(data, 101)
-    for name in (*NAMES[: order + 1], "force", "power"):
+    for name in (*NAMES[: order + 1], "force", "power", "current", "voltage"):
+        if name not in signals:
+            continue
         x = signals[name]
         low, high = float(np.min(x)), float(np.max(x))
         room = dice.choice([-0.1, -1e-7, 0.0, 1e-3]) * (high - low)
@@ -688,8 +793,11 @@ def test_ten_thousand_intervals() -> None:
 
 
 def write(folder: Path, data: Data, name: str = "result.json") -> Path:
+    """The file of a result, with the seal that belongs to it."""
     path = folder / name
-    path.write_text(json.dumps(data))
+    data = {key: value for key, value in data.items() if key != "seal"}
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    path.write_text(json.dumps(data | {"seal": hashlib.sha256(text.encode()).hexdigest()}))
     return path
 
 
@@ -713,7 +821,7 @@ def test_a_file_and_its_table(name: str, tmp_path: Path) -> None:
     assert plain.passed
     table = write_table(tmp_path, data)
     report = check_file(path, strict=True)
-    assert report.passed and report.not_checked == () and len(report.checks) == len(check(data).checks) + 1
+    assert report.passed and report.not_checked == () and len(report.checks) == len(check(data).checks) + 2
     text = table.read_text()
     lines = text.splitlines()
     for wrong in (
@@ -734,9 +842,9 @@ def test_columns_beyond_the_trajectory_are_said_not_to_be_checked(tmp_path: Path
     data = s_curve(load=LOAD)
     path, table = write(tmp_path, data), write_table(tmp_path, data)
     lines = table.read_text().splitlines()
-    table.write_text("\n".join([lines[0], lines[1] + ",F [N]", *(line + ",5" for line in lines[2:])]))
+    table.write_text("\n".join([lines[0], lines[1] + ",T [K]", *(line + ",5" for line in lines[2:])]))
     report = check_file(path)
-    assert report.passed and "F [N]" in report.not_checked[0]
+    assert report.passed and "T [K]" in report.not_checked[0]
 
 
 def test_no_solution_has_no_table(tmp_path: Path) -> None:
@@ -842,9 +950,53 @@ def test_a_report_says_what_is_wrong_in_one_line() -> None:
     data["trajectory"]["velocity"][5] *= 1.01
     report = check(data)
     told = report.to_dict()
-    assert set(told) == {"passed", "tolerance", "decided_by", "worst", "failed", "checks", "not_checked"}
+    assert set(told) == {"passed", "tolerance", "excess", "decided_by", "worst", "failed", "checks", "not_checked"}
     assert set(told["worst"]) == {"name", "violation", "tolerance", "time"}
     assert told["worst"]["name"] == "dynamics velocity" and told["worst"]["time"] == data["trajectory"]["time"][5]
     assert told["checks"] == len(report.checks) and not told["passed"]
     assert all("\n" not in line for line in told["failed"])
     assert report.summary().startswith("FAILED")
+
+
+def test_force_and_power_of_a_table_are_recomputed_and_units_compared(tmp_path: Path) -> None:
+    problem = trajopt.load("clemen_rupp_power_l2", ["transcription.intervals=20"])
+    trajopt.solve(problem).save(tmp_path)
+    path, table = tmp_path / "result.json", tmp_path / "trajectory.csv"
+    report = check_file(path)
+    assert report.passed and report.not_checked == ()
+    text = table.read_text()
+    lines = text.splitlines()
+    for column in (-1, -2):
+        cells = lines[9].split(",")
+        cells[column] = repr(float(cells[column]) * (1 + 1e-9))
+        table.write_text(text.replace(lines[9], ",".join(cells)))
+        assert [failed.name for failed in check_file(path).failed] == ["trajectory.csv"]
+    for name, wrong in (("q [m]", "q [mm]"), ("P [W]", "P [kW]"), ("F [N]", "F [N m]")):
+        table.write_text(text.replace(name, wrong))
+        assert wrong in check_file(path).summary()
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda data: data["prices"][0].update(per_percent=99.0),
+        lambda data: data["audit"].update(tolerance=1.0),
+        lambda data: data["route"].update(solver="another"),
+        lambda data: data["metrics"].pop("rms_jerk"),
+        lambda data: data.update(explanation={"text": ["because"]}),
+        lambda data: data.update(status="SOLVED_LOCAL"),
+        lambda data: data.update(certificate=None),
+    ],
+    ids=["price", "audit", "route", "metric", "explanation", "status", "certificate"],
+)
+def test_any_edit_breaks_the_seal(edit: Any, tmp_path: Path) -> None:
+    trajopt.solve(trajopt.load("clemen_rupp_jerk_l2", ["transcription.intervals=12"])).save(tmp_path)
+    path = tmp_path / "result.json"
+    assert check_file(path).passed
+    data = json.loads(path.read_text())
+    edit(data)
+    path.write_text(json.dumps(data))
+    assert "seal" in {failed.name for failed in check_file(path).failed}
+    del data["seal"]
+    path.write_text(json.dumps(data))
+    assert "missing" in check_file(path).summary()

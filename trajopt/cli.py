@@ -54,7 +54,7 @@ def solve(
     written = solution.save(output) if output is not None else []
     if as_json:
         compared = solution.comparison() if solution.status.solved else []
-        print(json.dumps(solution.to_dict() | {"comparison": compared}, allow_nan=False))
+        print(json.dumps(solution.sealed(comparison=compared), allow_nan=False))
     else:
         from trajopt.report import print_solution
 

@@ -22,7 +22,7 @@ from trajopt.model import Claim
 from trajopt.objective import Lowered
 from trajopt.outer import is_impossible
 from trajopt.power import descend, relax
-from trajopt.problem import FREE, Objective, Problem, Term
+from trajopt.problem import FREE, TOTALS, Objective, Problem, Term
 from trajopt.scaling import sizes_of
 from trajopt.switching import Chain, Impossible, Unresolved, feasible_durations, shortest
 from trajopt.switching_times import as_chain
@@ -50,7 +50,7 @@ def explain(setting: Setting, clock: Clock) -> dict[str, Any]:
 
 
 def _kinematic(problem: Problem) -> dict[str, Limit]:
-    return {name: limit for name, limit in problem.limits.given().items() if name != "power"}
+    return {name: limit for name, limit in problem.limits.given().items() if name not in ("power", "brake_energy")}
 
 
 def _sides(problem: Problem) -> dict[str, list[str]]:
@@ -168,7 +168,7 @@ def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock
     """What one limit would have to be, all others as they are; ``value`` None where no value is enough (``never``, by a
     certificate) or none was found in the time."""
     quantity, _, side = name.partition(".")
-    limit = getattr(setting.problem.limits, quantity)
+    limit = setting.problem.limits.given()[quantity]
     now = limit.lowest if side == "min" else limit.highest
     without_it = without(setting, [quantity]).problem
     roomy = replace(setting, sizes=sizes_of(without_it, setting.problem.order))
@@ -192,6 +192,7 @@ def _conflict(together: Attempt, duration: float) -> list[dict[str, Any]]:
     for name, weight in weights.items():
         at = together.outcome.prices[name].at[weight > 1e-3 * largest] if largest else np.empty(0)
         if len(at):
+            at = np.array([0.0, 1.0]) if name.partition(".")[0] in TOTALS else at
             conflict.append({"limit": name, "from": float(at.min() * duration), "to": float(at.max() * duration)})
     return conflict
 

@@ -97,6 +97,20 @@ def nonnegative(kind: str) -> BeforeValidator:
     return BeforeValidator(read)
 
 
+def plain(*, most: float, example: str, least: float = -math.inf, above: float = -math.inf) -> BeforeValidator:
+    """A number without a unit, ``least`` to ``most``, or ``above`` one and up to ``most``."""
+    wanted = f"{least:g} to {most:g}" if math.isfinite(least) else f"above {above:g} and at most {most:g}"
+
+    def read(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+            raise ValueError(f"must be a plain number such as {example}, no text and no unit, got {shown(value)}")
+        if not (least <= value <= most and value > above):
+            raise ValueError(f"must be {wanted}, got {shown(value)}")
+        return float(value)
+
+    return BeforeValidator(read)
+
+
 class Table(Section):
     """A value that varies over the move: piecewise linear in time, constant outside the table."""
 
@@ -188,6 +202,25 @@ def read_limit(kind: str) -> BeforeValidator:
         if len(pair) != 2:
             raise ValueError(f"needs one value (plus-minus) or a pair [min, max], got {len(pair)} values")
         return _checked(Limit(min=si(pair[0], kind, info), max=si(pair[1], kind, info)), value)
+
+    return BeforeValidator(read)
+
+
+def read_ceiling(kind: str) -> BeforeValidator:
+    """A limit from above on what is never negative: one number."""
+
+    def read(value: Any, info: ValidationInfo) -> Limit | None:
+        if value is None:
+            return None
+        highest = value
+        if isinstance(value, Limit) and value.min is None:
+            highest = value.max
+        elif isinstance(value, Mapping) and set(value) == {"max"}:
+            highest = value["max"]
+        bound = si(highest, kind, info)
+        if bound <= 0:
+            raise ValueError(f"must be > 0, got {shown(highest)}; leave the key out for no limit")
+        return Limit(max=bound)
 
     return BeforeValidator(read)
 

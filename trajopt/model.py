@@ -73,6 +73,9 @@ class Model(Rows, Protocol):
     def times(self, factor: Any, x: Any) -> Any:
         """The elementwise product of a constant (scalar or vector), or in a nonconvex model any expression, and x."""
 
+    def magnitude(self, x: Any) -> Any:
+        """|x| or, in a nonconvex model, variables that are at least that: for what is pressed down."""
+
     def minimize(self, value: Any) -> None:
         """Set the objective, a scalar of size about one."""
 

@@ -77,6 +77,9 @@ class ConvexModel:
     def squares(self, x: Any) -> Any:
         return cp.square(x)
 
+    def magnitude(self, x: Any) -> Any:
+        return cp.abs(x)
+
     def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
         self._rows.append(cp.SOC(bound, cp.multiply(weights, x)))
 

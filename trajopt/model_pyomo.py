@@ -112,16 +112,35 @@ class NonconvexModel:
     def squares(self, x: Any) -> Any:
         return x * x
 
+    def magnitude(self, x: Any) -> Any:
+        bound = self.variable(len(x))
+        self.nonpositive(x - bound)
+        self.nonpositive(-x - bound)
+        return bound
+
+    def raised(self, x: Any, exponent: float, size: float) -> tuple[Any, Any]:
+        """|x| to an exponent and its slope, from below: smoothed over 1e-4 of its size, with a convex function."""
+        square, smooth = x * x * (1 / size**2), 1e-8
+        value = (square + smooth) ** (exponent / 2) - smooth ** (exponent / 2)
+        slope = exponent * x * (square + smooth) ** (exponent / 2 - 1)
+        return size**exponent * value, size ** (exponent - 2) * slope
+
     def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
         self.nonpositive(-bound)
         self.nonpositive(self.total(np.square(weights), x * x) - bound * bound)
 
-    def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
-        """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a velocity over its size, smoothed
+    def signs(self, signal: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
+        """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a signal over its size, smoothed
         over w = 1e-3 so that Ipopt can follow."""
-        smooth = np.empty(len(velocity.nodes), dtype=object)
-        smooth[:] = [x / (x * x + 1e-6) ** 0.5 for x in velocity.nodes * (1 / size)]
-        return smooth, (smooth[:-1], smooth[1:])
+
+        def smooth(values: Any) -> Any:
+            x = values * (1 / size)
+            return x / (x * x + 1e-6) ** 0.5
+
+        if signal.nodes is None:
+            return None, (smooth(signal.pieces[0]), smooth(signal.pieces[-1]))
+        nodes = smooth(signal.nodes)
+        return nodes, (nodes[:-1], nodes[1:])
 
     def minimize(self, value: Any) -> None:
         self._model.objective = pyo.Objective(expr=value)

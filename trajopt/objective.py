@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 import norms
 from trajopt.mesh import Floats
-from trajopt.problem import Objective, Term
+from trajopt.motor import Intake
+from trajopt.problem import WITHOUT_NORM, Load, Objective, Term
 from trajopt.transcribe import Transcript
 
-_ENERGY = norms.L1()
+_POWERS: Final = {"energy": "power", "copper_loss": "heat", "electrical_energy": "electrical_power"}
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,13 @@ def measure(transcript: Transcript, objective: Objective) -> float:
     return total
 
 
+def _integral(name: str, load: Load) -> norms.Norm:
+    """What integrates the power behind an energy: its magnitude, all of it, or what the drive takes from the grid."""
+    if name == "energy":
+        return norms.L1()
+    return Intake(1.0 if name == "copper_loss" else load.recovery)
+
+
 @dataclass(frozen=True)
 class _Measured:
     """A term laid on the mesh: its samples, what each stands for, and its sizes."""
@@ -82,8 +90,8 @@ class _Measured:
         duration, sizes = transcript.duration, transcript.sizes
         if term.minimize == "time":
             return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, 1.0)
-        energy = term.minimize == "energy"
-        quantity = "power" if energy else term.minimize
+        energy = term.minimize in WITHOUT_NORM
+        quantity = _POWERS.get(term.minimize, term.minimize)
         signal = transcript.quantities.signal(quantity)
         weights = transcript.scheme.weights(signal, transcript.mesh)
         typical = sizes.duration
@@ -95,7 +103,6 @@ class _Measured:
         samples = signal.samples(transcript.model)
         if quantity == "position" and transcript.problem.move.start_position is None:
             samples = samples - transcript.chain[0][0]  # positions are absolute then; the norm is of the displacement
-        norm = _ENERGY if energy else term.norm
-        assert norm is not None
+        norm = term.norm or _integral(term.minimize, transcript.problem.load)
         unit = norm.measure(np.ones(len(weights)), weights, typical)
         return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), unit)

@@ -16,10 +16,10 @@ from typing import Any, Final
 import numpy as np
 
 from trajopt.attempt import Clock
-from trajopt.fields import Limit
 from trajopt.mesh import Floats
 from trajopt.model import Claim
-from trajopt.problem import DERIVATIVES, Problem
+from trajopt.motor import implied
+from trajopt.problem import DERIVATIVES
 from trajopt.transcribe import Setting, node_limits, prescribed
 
 _CERTAIN: Final = 1e-9  # relative widening: below it rounding could be the reason
@@ -33,7 +33,7 @@ def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
     """
     from trajopt.model_cvxpy import LADDER, ConvexModel
 
-    setting = replace(setting, problem=_with_force_as_acceleration(setting.problem))
+    setting = replace(setting, problem=implied(setting.problem))
     for rung in LADDER:
         model = ConvexModel()
         by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf))[0]
@@ -45,23 +45,6 @@ def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
         if outcome.claim is Claim.OPTIMAL:
             return False
     return False
-
-
-def _with_force_as_acceleration(problem: Problem) -> Problem:
-    """The problem with the acceleration limit that its force limit implies: a = (F - viscous·v - coulomb)/inertia."""
-    limits, load, way = problem.limits, problem.load, problem.one_way
-    if limits.force is None or not isinstance(load.inertia, float) or (load.coulomb and not way):
-        return problem
-    slowest, fastest = (limits.velocity.lowest, limits.velocity.highest) if limits.velocity else (-np.inf, np.inf)
-    drag = [load.viscous * v if load.viscous else 0.0 for v in (slowest, fastest)]
-    low = (limits.force.lowest - drag[1] - way * load.coulomb) / load.inertia
-    high = (limits.force.highest - drag[0] - way * load.coulomb) / load.inertia
-    if limits.acceleration is not None:
-        low, high = max(low, limits.acceleration.lowest), min(high, limits.acceleration.highest)
-    if load.coulomb:  # at rest friction takes any value up to Coulomb's, and the axis may stay
-        low, high = min(low, 0.0), max(high, 0.0)
-    implied = Limit(min=low if np.isfinite(low) else None, max=high if np.isfinite(high) else None)
-    return problem.model_copy(update={"limits": limits.model_copy(update={"acceleration": implied})})
 
 
 def _rows(setting: Setting, duration: float, model: Any, by: Any) -> None:

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from trajopt import units
+from trajopt import motor, units
 from trajopt.errors import NoSolution
 from trajopt.fields import Limit
 from trajopt.mesh import Floats
@@ -34,6 +34,7 @@ GREY: Final = "0.35"
 POINTS: Final = 4000  # about as many samples a curve, shared among the intervals
 ACTIVE: Final = 1e-6  # of the limit: closer than this, for longer than an interval, it is active
 ACTIVE_LOAD: Final = 1e-3  # the same for force and power: at a limit they sag between nodes, by the curvature of a step
+_ELECTRICAL: Final = ("current", "voltage", "electrical_power")
 IN_VIEW: Final = 1.6  # times the height of the curves: a limit farther off is named instead of shown
 
 
@@ -56,7 +57,8 @@ class Panels(list[Axes]):
 def plot(solution: Solution) -> Panels:
     """Stacked panels of one solution, limits dashed and shaded where active, the objective in the title.
 
-    Power has a panel when there is a load, force when it is limited or minimised. Raises NoSolution.
+    Power has a panel when there is a load, force when it is limited or minimised; current, voltage and electrical power
+    have when there is a motor. Raises NoSolution.
     """
     from trajopt.report import objective_text
 
@@ -144,7 +146,7 @@ def compare(
     second = {label: _moved(solution) for label, solution in (dashed or {}).items()}
     shown = [*solid.values(), *second.values()]
     present = {name for trajectory in shown for name in _names(trajectory)}
-    names: list[str] = [name for name in (*DERIVATIVES, "force", "power") if name in present]
+    names: list[str] = [name for name in (*DERIVATIVES, "force", "power", *_ELECTRICAL) if name in present]
     panels = _panels(names, shown[0])
     for axes, name in zip(panels, names, strict=True):
         for style, group in (("solid", solid), ((0, (3, 1.2)), second)):
@@ -179,6 +181,9 @@ def curve(trajectory: Trajectory, name: str) -> tuple[Floats, Floats]:
 
     Where only the nodes mean something (Euler, friction that changes sign) those.
     """
+    if name == "electrical_power":  # of all signals the only one that is no polynomial
+        time, force = curve(trajectory, "force")
+        return time, motor.power(trajectory.problem.load, force, np.interp(time, *curve(trajectory, "velocity")))
     signal = trajectory.signal(name)
     origin = trajectory.origin if name == "position" else 0.0
     if not signal.pieces:
@@ -203,8 +208,10 @@ def _names(trajectory: Trajectory) -> list[str]:
     problem = trajectory.problem
     names: list[str] = [*DERIVATIVES[: trajectory.order + 1]]
     if problem.load.inertia is not None:
-        wanted = problem.limits.force is not None or any(term.minimize == "force" for term in problem.objective.terms)
+        limited = any(getattr(problem.limits, name) is not None for name in ("force", "envelope", "rms_force"))
+        wanted = limited or any(term.minimize == "force" for term in problem.objective.terms)
         names += ["force", "power"] if wanted else ["power"]
+        names += _ELECTRICAL if problem.load.motor else ()
     return names
 
 
@@ -234,9 +241,7 @@ def _pretty(unit: str) -> str:
 
 
 def _limit(trajectory: Trajectory, name: str) -> Limit | None:
-    limit = getattr(trajectory.problem.limits, name)
-    assert limit is None or isinstance(limit, Limit)
-    return limit
+    return trajectory.problem.limits.given().get(name)
 
 
 def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:

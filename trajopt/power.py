@@ -3,7 +3,10 @@
 On the exact scheme with jerk constant on intervals, w_k = v_k + a_k h/2 (the middle Bernstein coefficient of velocity)
 gives the power at the nodes exactly as m a_k v_k = m (w_k² - w_(k-1)²)/(2h). The relaxation puts q_k >= w_k²/2 in the
 place of the squares, anchored at the prescribed ends, and below the chord of what w_k can reach: q_k <= top_k w_k/2.
-Power is then affine, and the optimum a lower bound for every move on the mesh. From its answer, programs with the power
+Power is then affine, and the optimum a lower bound for every move on the mesh. Where acceleration is constant on
+intervals, squares of the velocity at the nodes do the same for the mean of the power at both ends of an interval,
+m (v_(k+1)² - v_k²)/(2h): norms of it are at most those of the power, by convexity. Losses of a motor that are convex
+in force add to it; those that are not are left out. From the answer of the relaxation, programs with the power
 linearised at the last one descend to a local optimum: every point between two feasible moves is feasible.
 """
 
@@ -14,15 +17,17 @@ from typing import Any, Final
 
 import numpy as np
 
+from trajopt import motor, signals
 from trajopt.attempt import Attempt, Clock, convex, to
 from trajopt.mesh import Floats
 from trajopt.model import Claim, Outcome
-from trajopt.problem import Problem
+from trajopt.motor import implied
+from trajopt.problem import Load, Problem
 from trajopt.quantities import Quantities
 from trajopt.rebuild import rebuild
-from trajopt.signals import Signal
+from trajopt.signals import OnFloats, Signal
 from trajopt.trajectory import Trajectory
-from trajopt.transcribe import Setting, prescribed
+from trajopt.transcribe import Setting, prescribed, without
 
 _STEPS: Final = 30
 _ENOUGH: Final = 1e-10  # relative: a smaller gain ends the descent
@@ -30,7 +35,7 @@ _ENOUGH: Final = 1e-10  # relative: a smaller gain ends the descent
 
 def relax(setting: Setting, clock: Clock) -> Attempt:
     """The relaxation: its ``bound`` holds for every move on the mesh; its trajectory meets all but the power."""
-    duration = setting.problem.move.fixed_time
+    duration, setting = setting.problem.move.fixed_time, without(setting, ["brake_energy"])
     assert duration is not None
     return convex(replace(setting, quantities=Lifted), duration, to(setting.problem.objective), clock)
 
@@ -73,16 +78,49 @@ def _search_line(setting: Setting, here: Trajectory, there: Trajectory, value: f
 
 
 def _linearised_at(reference: Trajectory) -> Any:
-    """Quantities whose power is linearised at a trajectory."""
-    force, velocity = reference.signal("force").nodes, reference.signal("velocity").nodes
+    """Quantities whose power is linearised at a trajectory; of electrical power what is not convex."""
+    known = reference.transcript.quantities
+    at = known.ends("force", "acceleration", "velocity", "current") if known.problem.load.motor else []
+    forces = known.ends("force", "velocity")
 
     class Linearised(Quantities):
         def _power(self) -> Signal:
-            times = self.model.times
-            change = times(force, self.signal("velocity").nodes) + times(velocity, self.signal("force").nodes)
-            return Signal(change - force * velocity, ())
+            pairs = zip(self.ends("force", "velocity"), forces, strict=True)
+            return signals.sampled([_product_at(self.model, x, x0) for x, x0 in pairs])
+
+        def _electrical_power(self) -> Signal:
+            here = self.ends("force", "acceleration", "velocity", "current")
+            return signals.sampled([self._drawn(x, x0) for x, x0 in zip(here, at, strict=True)])
+
+        def _drawn(self, here: Any, there: Any) -> Any:
+            (_, a, v, u), (_, a0, v0, u0) = here, there
+            load, model, way = self.problem.load, self.model, self.problem.one_way
+            power = model.times(load.inertia, _product_at(model, (a, v), (a0, v0)))
+            power = power + motor.heat(model, load, u, self.sizes.current)
+            if load.viscous:
+                size = self.sizes.derivative[1]
+                power = power + model.times(load.viscous * size**2, model.squares(v * (1 / size)))
+            if load.coulomb:
+                power = power + model.times(way * load.coulomb, v)
+            return power + _iron_at(model, load, way, (u, v), (u0, v0))
 
     return Linearised
+
+
+def _product_at(model: Any, pair: Any, at: Any) -> Any:
+    """A product linearised."""
+    (x, y), (x0, y0) = pair, at
+    return model.times(x0, y) + model.times(y0, x) - x0 * y0
+
+
+def _iron_at(model: Any, load: Load, way: int, pair: Any, at: Any) -> Any:
+    """The losses in iron, linearised in current and velocity."""
+    (u, v), (u0, v0) = pair, at
+    raised, slope = OnFloats().raised(u0, load.hysteresis_exponent, 1.0)
+    value = load.eddy * (v0 * u0) ** 2 + load.hysteresis * np.abs(v0) * raised
+    by_current = 2 * load.eddy * v0**2 * u0 + load.hysteresis * np.abs(v0) * slope
+    by_velocity = 2 * load.eddy * u0**2 * v0 + load.hysteresis * way * raised
+    return value + model.times(by_current, u - u0) + model.times(by_velocity, v - v0)
 
 
 @dataclass(frozen=True)
@@ -92,11 +130,36 @@ class Lifted(Quantities):
     def _power(self) -> Signal:
         kept = getattr(self.model, "lifted_power", None)
         if kept is None:
-            kept = self.model.lifted_power = Signal(self._nodes(), ())
+            known = self._nodes() if self.problem.order == 3 else self._means()
+            kept = self.model.lifted_power = known
         return kept
 
-    def _nodes(self) -> Any:
-        """(N+1,) power at the nodes, affine in the chain and the lifted squares."""
+    def _electrical_power(self) -> Signal:
+        model, load = self.model, self.problem.load
+        heats = [motor.heat(model, load, u, self.sizes.current) for (u,) in self.ends("current")]
+        heat = sum(heats[1:], heats[0]) * (1 / len(heats))
+        mechanical = self._power()
+        if mechanical.nodes is not None:
+            return Signal(heat + mechanical.nodes, ())
+        return Signal(None, (heat + mechanical.pieces[0],))
+
+    def _means(self) -> Signal:
+        """The mean of the power at both ends of every interval, affine in the chain and the lifted squares."""
+        load, way, model = self.problem.load, self.problem.one_way, self.model
+        mass, step, last = load.inertia, float(self.steps[0]), self.mesh.intervals
+        velocity = self.signal("velocity").nodes
+        ends = {(node, i): x for node, i, x in prescribed(self.problem, self.mesh)}
+        assert isinstance(mass, float)
+        squares = self._squares(way * velocity, _node_reach(self, step), (ends[0, 1], ends[last, 1]))
+        power = model.times(mass / step, squares[1:] - squares[:-1])
+        if load.viscous:
+            power = power + model.times(load.viscous, squares[1:] + squares[:-1])
+        if load.coulomb:
+            power = power + model.times(way * load.coulomb / 2, velocity[1:] + velocity[:-1])
+        return Signal(None, (power,))
+
+    def _nodes(self) -> Signal:
+        """Power at the nodes, affine in the chain and the lifted squares."""
         load, way, model = self.problem.load, self.problem.one_way, self.model
         mass, step, last = load.inertia, float(self.steps[0]), self.mesh.intervals
         velocity = self.signal("velocity")
@@ -111,7 +174,7 @@ class Lifted(Quantities):
             power = power + model.times(2 * load.viscous, nodes)
         if load.coulomb:
             power = power + model.times(way * load.coulomb, velocity.nodes)
-        return power
+        return Signal(power, ())
 
     def _squares(self, speed: Any, top: Floats, ends: tuple[float, float]) -> Any:
         """What stands for speed²/2: its value at the ends; between them variables from speed²/2 to the chord
@@ -143,21 +206,20 @@ def _node_reach(quantities: Quantities, step: float) -> Floats:
 
 
 def _fastest(quantities: Quantities) -> float:
-    limit, way = quantities.problem.limits.velocity, quantities.problem.one_way
-    assert limit is not None
-    return limit.highest if way > 0 else -limit.lowest
+    return _outwards(implied(quantities.problem), "velocity", quantities.problem.one_way)
 
 
 def _greedy(quantities: Quantities, step: float, backwards: bool) -> tuple[Floats, Floats]:
     """(N+1,) speed and acceleration of the move that speeds up as hard as it can from one end, time running away from
     it: no other is faster anywhere, since each derivative grows with the one above it."""
-    problem, way = quantities.problem, quantities.problem.one_way
-    state = (problem.move.end if backwards else problem.move.start).fixed(3)
+    problem, way = implied(quantities.problem), quantities.problem.one_way
+    state = (problem.move.end if backwards else problem.move.start).fixed(problem.order)
     turn = -1.0 if backwards else 1.0
     hardest = [_outwards(problem, name, way * sign) for name, sign in (("acceleration", turn), ("jerk", 1.0))]
-    start, count = way * turn * state[2], quantities.mesh.intervals
+    count = quantities.mesh.intervals
+    start = way * turn * state.get(2, 0.0)
     acceleration = np.full(count + 1, max(hardest[0], start))
-    if np.isfinite(hardest[1]):
+    if problem.order == 3 and np.isfinite(hardest[1]):
         acceleration = np.minimum(start + hardest[1] * step * np.arange(count + 1), acceleration)
     speed = way * state[1] + np.concatenate([[0.0], np.cumsum((acceleration[1:] + acceleration[:-1]) * step / 2)])
     return speed, acceleration

@@ -9,7 +9,8 @@ import numpy as np
 
 from trajopt import units
 from trajopt.fields import Limit
-from trajopt.problem import DERIVATIVES, MOST_INTERVALS, Problem, State
+from trajopt.problem import DERIVATIVES, ELECTRICAL, LOADED, MOST_INTERVALS, MOTOR, Problem, State
+from trajopt.rating import refuse_weak_motor
 
 if TYPE_CHECKING:
     from trajopt.plant.problem import PlantProblem
@@ -27,6 +28,7 @@ def refuse_contradictions(problem: Problem) -> None:
     for where, state in _states(problem):
         _within_limits(problem, where, state)
     _doomed(problem)
+    refuse_weak_motor(problem)
 
 
 def warnings(problem: Problem | PlantProblem) -> list[str]:
@@ -102,11 +104,20 @@ def _stays(problem: Problem) -> bool:
 
 
 def _load(problem: Problem) -> None:
-    needs = [f"objective {t.minimize}" for t in problem.objective.terms if t.minimize in ("force", "power", "energy")]
-    needs += [f"limits.{name}" for name in problem.limits.given() if name in ("force", "power")]
-    if needs and problem.load.inertia is None:
+    load = problem.load
+    named = {f"objective {term.minimize}": term.minimize for term in problem.objective.terms}
+    named |= {f"limits.{name}": name for name in problem.limits.given()}
+    needs = [where for where, name in named.items() if name in (*LOADED, *ELECTRICAL)]
+    if needs and load.inertia is None:
         remedy = 'write inertia = "4e-4 kg m^2"' if problem.rotary else 'write mass = "10 kg"'
         raise ValueError(f"load.{'inertia' if problem.rotary else 'mass'}: is missing; {needs[0]} needs it; {remedy}")
+    needs = [where for where, name in named.items() if name in ELECTRICAL]
+    given = load.model_dump(exclude_defaults=True)
+    needs += [f"load.{key}" for key in MOTOR if key in given]
+    for key in MOTOR[:2]:
+        if needs and getattr(load, key) is None:
+            example = units.kinds(problem.rotary)[key].example
+            raise ValueError(f'load.{key}: is missing; {needs[0]} needs it; write {key} = "{example}"')
 
 
 def _via(problem: Problem) -> None:

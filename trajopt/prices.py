@@ -51,7 +51,7 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
     found: dict[str, tuple[float, float]] = {}
     for key, rows in attempt.outcome.prices.items():
         quantity, _, side = key.partition(".")
-        symmetric = getattr(problem.limits, quantity).symmetric
+        symmetric = problem.limits.given()[quantity].symmetric
         name, outwards = (quantity, 1.0) if symmetric else (key, 1.0 if side == "max" else -1.0)
         unit, own = found.get(name, (0.0, 0.0))
         change = -rows.per_unit * attempt.slope
@@ -86,7 +86,7 @@ def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float
 def _is_zero(problem: Problem, name: str) -> bool:
     """Whether a limit is zero, so that a percentage of it means nothing."""
     quantity, _, side = name.partition(".")
-    return bool(side) and getattr(getattr(problem.limits, quantity), side) == 0.0
+    return bool(side) and getattr(problem.limits.given()[quantity], side) == 0.0
 
 
 def sentence(row: Mapping[str, Any], name: str, label: str) -> str:

@@ -16,13 +16,16 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, Va
 
 import norms
 from trajopt import units
+from trajopt.envelope import Envelope, read_envelope
 from trajopt.fields import (
     Limit,
     Section,
     Table,
     nearest,
     nonnegative,
+    plain,
     positive,
+    read_ceiling,
     read_limit,
     read_table,
     refuse_unknown,
@@ -100,12 +103,14 @@ def _move_time(value: Any, info: ValidationInfo) -> Any:
 
 
 class Move(Section):
-    """From where to where, in which time: fixed (s), within a pair [min, max] (s), or free."""
+    """From where to where, in which time: fixed (s), within a pair [min, max] (s), or free; and for how long the axis
+    rests before the next cycle (``dwell``, s), which the RMS of the force takes into account."""
 
     time: Annotated[float | tuple[float, float] | Literal["free"], BeforeValidator(_move_time)]
     start: State = State(position=0.0)
     end: State
     via: tuple[Via, ...] = ()
+    dwell: Annotated[float, nonnegative("time")] = 0.0
 
     @model_validator(mode="after")
     def _positions(self) -> Self:
@@ -126,7 +131,11 @@ class Move(Section):
 
 
 class Limits(Section):
-    """Limits on the signals of the axis; a key left out is no limit. Force is N, or N m (torque) for a rotary axis."""
+    """Limits on the signals of the axis; a key left out is no limit. Force is N, or N m (torque) for a rotary axis.
+
+    ``envelope``: the motor's force over speed; ``rms_force``: of the force over the cycle, sqrt(∫F²dt/(T + dwell));
+    ``brake_energy``: fed back by the motor in a move, ∫max(0, -P)dt, J.
+    """
 
     position: Annotated[Limit | None, read_limit("position")] = None
     velocity: Annotated[Limit | None, read_limit("velocity")] = None
@@ -135,10 +144,16 @@ class Limits(Section):
     snap: Annotated[Limit | None, read_limit("snap")] = None
     force: Annotated[Limit | None, read_limit("force")] = None
     power: Annotated[Limit | None, read_limit("power")] = None
+    current: Annotated[Limit | None, read_limit("current")] = None
+    voltage: Annotated[Limit | None, read_limit("voltage")] = None
+    envelope: Annotated[Envelope | None, BeforeValidator(read_envelope)] = None
+    rms_force: Annotated[Limit | None, read_ceiling("rms_force")] = None
+    brake_energy: Annotated[Limit | None, read_ceiling("brake_energy")] = None
 
     def given(self) -> dict[str, Limit]:
-        """The limits there are, by name."""
-        return {name: limit for name in type(self).model_fields if (limit := getattr(self, name)) is not None}
+        """The limits there are, by name; of the envelope what holds each of its lines."""
+        found = {name: limit for name in type(self).model_fields if (limit := getattr(self, name)) is not None}
+        return {name: limit.limit if isinstance(limit, Envelope) else limit for name, limit in found.items()}
 
 
 def _inertia(value: Any, info: ValidationInfo) -> Any:
@@ -155,19 +170,44 @@ def _inertia(value: Any, info: ValidationInfo) -> Any:
 
 
 class Load(Section):
-    """What is moved: force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13 to 15).
+    """What is moved: force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13 to 15), and by which motor.
 
     ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, or a Table over time
-    (Remark 1); ``coulomb`` N or N m; ``viscous`` N s/m or N m s.
+    (Remark 1); ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor see `trajopt.motor`: ``torque_constant``
+    N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)² or (A rad/s)², ``hysteresis`` W per m/s
+    or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it feeds back can be used.
     """
 
     inertia: Annotated[float | Table | None, BeforeValidator(_inertia)] = None
     coulomb: Annotated[float, nonnegative("force")] = 0.0
     viscous: Annotated[float, nonnegative("viscous")] = 0.0
+    torque_constant: Annotated[float | None, positive("torque_constant")] = None
+    resistance: Annotated[float | None, positive("resistance")] = None
+    switching: Annotated[float, nonnegative("switching")] = 0.0
+    eddy: Annotated[float, nonnegative("eddy")] = 0.0
+    hysteresis: Annotated[float, nonnegative("hysteresis")] = 0.0
+    hysteresis_exponent: Annotated[float, plain(above=1.0, most=2.0, example="1.6")] = 2.0
+    recovery: Annotated[float, plain(least=0.0, most=1.0, example="0.7")] = 0.0
+
+    @property
+    def motor(self) -> tuple[float, float] | None:
+        """Torque constant and resistance, or None where there is no motor."""
+        if self.torque_constant is None or self.resistance is None:
+            return None
+        return self.torque_constant, self.resistance
 
 
-MINIMIZABLE: Final = ("position", "velocity", "acceleration", "jerk", "snap", "force", "power", "energy", "time")
-WITHOUT_NORM: Final = ("energy", "time")
+MOTOR: Final = (
+    "torque_constant", "resistance", "switching", "eddy", "hysteresis", "hysteresis_exponent", "recovery",
+)  # fmt: skip
+MINIMIZABLE: Final = (
+    "position", "velocity", "acceleration", "jerk", "snap", "force", "power", "current", "voltage", "energy",
+    "copper_loss", "electrical_energy", "time",
+)  # fmt: skip
+WITHOUT_NORM: Final = ("energy", "copper_loss", "electrical_energy", "time")
+LOADED: Final = ("force", "power", "energy", "envelope", "rms_force")  # what needs an inertia ...
+TOTALS: Final = ("rms_force", "brake_energy")  # of the whole move, not of an instant
+ELECTRICAL: Final = ("current", "voltage", "copper_loss", "electrical_energy", "brake_energy")  # ... and a motor, too
 
 
 def _norm(value: Any) -> norms.Norm | None:
@@ -206,7 +246,8 @@ def _touches(value: Any) -> int | None:
 
 
 class Term(Section):
-    """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt (J), or time (s)."""
+    """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt, copper loss or
+    electrical energy (J, see `trajopt.motor`), or time (s)."""
 
     minimize: str
     norm: Annotated[norms.Norm | None, BeforeValidator(_norm), PlainSerializer(lambda n: n and n.name)] = None
@@ -305,8 +346,8 @@ class Transcription(Section):
 
 
 def _printable(text: str) -> str:
-    if not text.isprintable() or len(text) > 1000:
-        raise ValueError(f"must be one line of printable text, at most 1000 characters, got {shown(text)}")
+    if not text.isprintable():
+        raise ValueError(f"must be one line of printable text, got {shown(text)}")
     return text
 
 
@@ -375,7 +416,9 @@ class Problem(Section):
     def with_limit(self, name: str, value: float) -> Problem:
         """A copy with one limit (``jerk``, plus-minus) or one side of it (``velocity.max``) set to a value, SI."""
         quantity, _, side = name.partition(".")
-        limit: Limit = getattr(self.limits, quantity)
+        limit: Limit | Envelope = getattr(self.limits, quantity)
+        if isinstance(limit, Envelope):
+            return self.replace(limits=self.limits.model_copy(update={quantity: limit.scaled(value / limit.force[0])}))
         sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
         return self.replace(limits=self.limits.model_copy(update={quantity: Limit(**sides)}))
 

@@ -47,7 +47,10 @@ _LISTS: Final = {
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
 _SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"
-_ALIASES: Final = {"load": {"mass": "inertia"}, "limits": {"torque": "force"}}
+_ALIASES: Final = {
+    "load": {"mass": "inertia", "force_constant": "torque_constant"},
+    "limits": {"torque": "force", "rms_torque": "rms_force"},
+}
 
 
 def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem:

@@ -1,20 +1,24 @@
 """Quantities: what can be limited or minimised, from the chain of derivatives and the load.
 
 force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13, 14); power = force·v (eq. 7); energy = ∫|P|dt
-(eq. 12).
+(eq. 12). What is electrical is in `trajopt.motor`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
-from trajopt import signals
+import numpy as np
+
+from trajopt import motor, signals
 from trajopt.mesh import Mesh
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.scaling import Sizes
 from trajopt.schemes import Scheme
-from trajopt.signals import Signal
+from trajopt.signals import OnFloats, Signal
+
+FORCES: Final = ("force", "current", "voltage", "envelope", "rms_force", "copper_loss")  # affine but for friction
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,95 @@ class Quantities:
         """A quantity by name, SI; position is the displacement from the start."""
         if name in DERIVATIVES:
             return self.scheme.signal(self.model, self.chain, DERIVATIVES.index(name), self.steps)
-        return self._force() if name == "force" else self._power()
+        made = {
+            "force": self._force,
+            "power": self._power,
+            "current": self._current,
+            "voltage": self._voltage,
+            "heat": self._heat,
+            "electrical_power": self._electrical_power,
+        }
+        return made[name]()
+
+    def mix(self, force: float, velocity: float) -> Signal:
+        """force·F + velocity·v: a current, a voltage, a side of an envelope."""
+        count, model = self.mesh.intervals, self.model
+        parts = [(force, "force"), (velocity, "velocity")]
+        found = [signals.product(model, signals.constant(x, count), self.signal(name)) for x, name in parts if x]
+        return found[0] if len(found) == 1 else signals.plus(model, *found)
+
+    def returned(self) -> Signal:
+        """An upper bound on the power that a motor feeds back, -P, by polynomials: |u| is more than its own smoothed
+        sign times u, and |u|^γ more than its tangent at the middle of an interval."""
+        load, model, count = self.problem.load, self.model, self.mesh.intervals
+        assert load.motor is not None
+        current, velocity, force = (self.signal(name) for name in ("current", "velocity", "force"))
+
+        def product(*factors: Signal | float) -> Signal:
+            found = signals.constant(1.0, count)
+            for factor in factors:
+                factor = signals.constant(factor, count) if isinstance(factor, float) else factor
+                found = signals.product(model, found, factor)
+            return found
+
+        parts = [product(-1.0, force, velocity), product(-load.motor[1], current, current)]
+        if load.switching:
+            parts.append(product(-load.switching, current, self._sign(current, self.sizes.current)))
+        if load.eddy:
+            parts.append(product(-load.eddy, current, current, velocity, velocity))
+        if load.hysteresis:
+            speed = product(velocity, self._sign(velocity, self.sizes.derivative[1]))
+            parts.append(product(-load.hysteresis, speed, self._tangent(current)))
+        total = parts[0]
+        for part in parts[1:]:
+            total = signals.plus(model, total, part)
+        return total
+
+    def _sign(self, signal: Signal, size: float) -> Signal:
+        nodes, pieces = self.model.signs(signal, size)
+        return Signal(nodes, pieces if signal.pieces else ())
+
+    def _tangent(self, current: Signal) -> Signal:
+        """|u|^γ at the nodes, and its tangent at the middle of every interval."""
+        load, model = self.problem.load, self.model
+        exponent, size = load.hysteresis_exponent, self.sizes.current
+        nodes = None if current.nodes is None else model.raised(current.nodes, exponent, size)[0]
+        if not current.pieces:
+            return Signal(nodes, ())
+        middle = sum(current.pieces[1:], current.pieces[0]) * (1 / len(current.pieces))
+        value, slope = model.raised(middle, exponent, size)
+        return Signal(nodes, tuple(value + model.times(slope, x - middle) for x in current.pieces))
+
+    def _current(self) -> Signal:
+        assert self.problem.load.motor is not None
+        return self.mix(1 / self.problem.load.motor[0], 0.0)
+
+    def _voltage(self) -> Signal:
+        assert self.problem.load.motor is not None
+        constant, resistance = self.problem.load.motor
+        return self.mix(resistance / constant, constant)
+
+    def _heat(self) -> Signal:
+        load, size = self.problem.load, self.sizes.current
+        return signals.sampled([motor.copper(self.model, load, u, size) for (u,) in self.ends("current")])
+
+    def _electrical_power(self) -> Signal:
+        load, model, size = self.problem.load, self.model, self.sizes.current
+        return signals.sampled([
+            motor.heat(model, load, u, size) + motor.iron(model, load, u, self._speed(v), size) + model.times(force, v)
+            for force, v, u in self.ends("force", "velocity", "current")
+        ])  # fmt: skip
+
+    def ends(self, *names: str) -> list[tuple[Any, ...]]:
+        """Signals by name where force is sampled: at the nodes, or at the left and the right ends of the intervals."""
+        found = [self.signal(name) for name in ("force", *names)]
+        at_nodes = found[0].nodes is not None
+        return list(zip(*(signal.ends(at_nodes) for signal in found[1:]), strict=True))
+
+    def _speed(self, velocity: Any) -> Any:
+        """|v| at samples."""
+        way = self.problem.one_way
+        return self.model.times(way, velocity) if way else self.model.raised(velocity, 1.0, self.sizes.derivative[1])[0]
 
     def _force(self) -> Signal:
         load, model = self.problem.load, self.model
@@ -54,7 +146,8 @@ class Quantities:
 
     def _coulomb(self, velocity: Signal) -> Signal:
         coulomb, way = self.problem.load.coulomb, self.problem.one_way
-        if way:
+        stands = isinstance(self.model, OnFloats) and not np.any(velocity.nodes)  # friction holds it, at no cost
+        if way and not stands:
             return signals.constant(way * coulomb, self.mesh.intervals)
         nodes, pieces = self.model.signs(velocity, self.sizes.derivative[1])
         return Signal(coulomb * nodes, tuple(coulomb * piece for piece in pieces) if velocity.pieces else ())
@@ -64,7 +157,7 @@ class Quantities:
 
 
 def is_affine(problem: Problem, name: str) -> bool:
-    """Whether a quantity is affine in the kinematic variables, at a fixed duration."""
-    if name == "force":
+    """Whether a quantity is affine in the kinematic variables, at a fixed duration, or a square of what is."""
+    if name in FORCES:
         return not problem.load.coulomb or problem.one_way != 0
-    return name not in ("power", "energy", "time")
+    return name not in ("power", "energy", "electrical_energy", "brake_energy", "time")

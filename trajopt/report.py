@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
 from trajopt import units
+from trajopt.fields import Limit
 from trajopt.prices import sentence
 from trajopt.problem import Problem
 
@@ -16,7 +18,13 @@ if TYPE_CHECKING:
     from trajopt.plant.solution import PlantSolution
     from trajopt.solution import Solution
 
-_ROWS = ("velocity", "acceleration", "jerk", "snap", "force", "power")
+_ROWS = ("velocity", "acceleration", "jerk", "snap", "force", "power", "current", "voltage")
+_ENERGIES = {
+    "energy": "energy ∫|P|dt",
+    "copper_loss": "copper loss",
+    "electrical_energy": "electrical energy",
+    "brake_energy": "fed back",
+}
 
 
 def print_solution(solution: Solution | PlantSolution) -> None:
@@ -135,11 +143,26 @@ def _table(solution: Solution) -> Table:
             continue
         limit = given.get(name)
         shown = "" if limit is None else "by time" if limit.varies else _limit_text(limit.lowest, limit.highest)
-        values = [f"{solution.metrics[f'{kind}_{name}']:.6g}" for kind in ("peak", "rms")]
+        found = [solution.metrics.get(f"{kind}_{name}") for kind in ("peak", "rms")]
+        values = ["" if x is None else f"{x:.6g}" for x in found]
         table.add_row(kinds[name].name, *values, shown, kinds[name].unit)
-    if "energy" in solution.metrics:
-        table.add_row("energy ∫|P|dt", f"{solution.metrics['energy']:.6g}", "", "", "J")
+    if (limit := given.get("rms_force")) is not None:
+        _add_cycle(table, solution, limit)
+    for name, label in _ENERGIES.items():
+        if name in solution.metrics:
+            limit = given.get(name)
+            most = "" if limit is None else f"{limit.highest:g}"
+            table.add_row(label, f"{solution.metrics[name]:.6g}", "", most, "J")
     return table
+
+
+def _add_cycle(table: Table, solution: Solution, limit: Limit) -> None:
+    """The RMS of force over the move and the rest after it."""
+    assert solution.duration is not None
+    kind = units.kinds(solution.problem.rotary)["rms_force"]
+    share = solution.duration / (solution.duration + solution.problem.move.dwell)
+    rms = solution.metrics["rms_force"] * sqrt(share)
+    table.add_row(f"{kind.name} of the cycle", "", f"{rms:.6g}", f"{limit.highest:g}", kind.unit)
 
 
 def _limit_text(lowest: float, highest: float) -> str:

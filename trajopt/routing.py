@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Problem
-from trajopt.quantities import is_affine
+from trajopt.quantities import FORCES, is_affine
 from trajopt.switching_times import as_chain
 
 if TYPE_CHECKING:
@@ -89,18 +89,18 @@ def is_time_search(problem: Problem) -> bool:
 
 
 def has_power_bound(problem: Problem) -> bool:
-    """Whether `trajopt.power` can bound power and energy globally: exact scheme, jerk on top, fixed time, one way, ends
-    of given velocity and acceleration, equal steps. Elsewhere no global bound is known."""
+    """Whether `trajopt.power` can bound power and energy globally: exact scheme, jerk or acceleration on top, fixed
+    time, one way, ends of given velocity (and acceleration), equal steps. Elsewhere no global bound is known."""
     move = problem.move
     varies = any(limit.varies for limit in problem.limits.given().values()) or not isinstance(
         problem.load.inertia, float
     )
     return (
         problem.transcription.scheme == "exact"
-        and problem.order == 3
+        and problem.order in (2, 3)
         and move.fixed_time is not None
         and problem.one_way != 0
-        and all(state.fixed(3).keys() >= {1, 2} for state in (move.start, move.end))
+        and all(state.fixed(problem.order).keys() >= set(range(1, problem.order)) for state in (move.start, move.end))
         and move.start.position != FREE
         and not (move.via or varies)
     )
@@ -116,7 +116,7 @@ def _nonconvex(problem: Problem) -> str:
         if not is_affine(problem, term.minimize):
             return f"{term.label} is nonconvex: " + (
                 "friction changes sign with the velocity"
-                if term.minimize == "force"
+                if term.minimize in FORCES
                 else "a product of force and velocity"
             )
     return ""
@@ -125,6 +125,8 @@ def _nonconvex(problem: Problem) -> str:
 def _not_quadratic(problem: Problem) -> str:
     if problem.move.fixed_time is None:
         return "the search over the time is Clarabel's"
+    if problem.limits.rms_force is not None:
+        return "an RMS limit is a second-order cone"
     norms_used = [term.norm for term in problem.objective.terms if term.norm]
     if len(norms_used) > 1 and any(norm.name == "l2" for norm in norms_used):
         return "an l2 norm in a weighted sum is a second-order cone"
@@ -137,8 +139,9 @@ def _convex_reason(problem: Problem) -> str:
     condition = f", as long as the {extra[0]} limit stays inactive" if extra else ""
     if problem.move.fixed_time is None:
         return f"convex at every fixed time: a search over the time{condition}"
-    norms_used = {term.norm.name for term in problem.objective.terms if term.norm}
-    kind = {frozenset({"l2"}): "quadratic"}.get(
+    norms_used = {term.norm.name if term.norm else term.minimize for term in problem.objective.terms}
+    kind = {frozenset({"l2"}): "quadratic", frozenset({"copper_loss"}): "quadratic"}.get(
         frozenset(norms_used), "linear" if norms_used <= {"l1", "linf"} else "cone"
     )
+    kind = "cone" if problem.limits.rms_force is not None else kind
     return f"convex: a {kind} program{condition}"

@@ -7,18 +7,24 @@ infeasible. With these sizes metres, nanometres and kilometres give the same pro
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from trajopt.problem import DERIVATIVES, Problem
+from trajopt.motor import available_force
+from trajopt.problem import DERIVATIVES, Load, Problem
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """``derivative[i]``: size of the i-th derivative, SI; ``duration`` in s; ``force`` N or N m; ``power`` W."""
+    """``derivative[i]``: size of the i-th derivative, SI; ``duration`` in s; ``force`` N or N m; ``power`` W; with a
+    motor ``current`` A, ``voltage`` V, ``heat`` (copper) and ``losses`` (of all kinds) W."""
 
     derivative: tuple[float, ...]
     duration: float
     force: float
+    current: float = 1.0
+    voltage: float = 1.0
+    heat: float = 1.0
+    losses: float = 0.0
 
     @property
     def power(self) -> float:
@@ -29,9 +35,20 @@ class Sizes:
         """Size of a quantity by name, SI."""
         if quantity in DERIVATIVES:
             return self.derivative[DERIVATIVES.index(quantity)]
-        return {"force": self.force, "power": self.power, "energy": self.power * self.duration, "time": self.duration}[
-            quantity
-        ]
+        electrical = self.power + self.losses
+        return {
+            "force": self.force,
+            "envelope": self.force,
+            "rms_force": self.force,
+            "power": self.power,
+            "energy": self.power * self.duration,
+            "current": self.current,
+            "voltage": self.voltage,
+            "heat": self.heat,
+            "electrical_power": electrical,
+            "brake_energy": electrical * self.duration,
+            "time": self.duration,
+        }[quantity]
 
 
 def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
@@ -52,7 +69,18 @@ def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
     mass = 0.0 if inertia is None else inertia if isinstance(inertia, float) else max(inertia.value)
     load = problem.load
     force = mass * derivative[2] + load.viscous * derivative[1] + load.coulomb
-    return Sizes(tuple(derivative), duration, force or 1.0)
+    return _with_motor(load, Sizes(tuple(derivative), duration, force or 1.0))
+
+
+def _with_motor(load: Load, sizes: Sizes) -> Sizes:
+    if load.motor is None:
+        return sizes
+    constant, resistance = load.motor
+    current, speed = sizes.force / constant, sizes.derivative[1]
+    heat = resistance * current**2
+    losses = heat + load.switching * current + load.eddy * (speed * current) ** 2
+    losses += load.hysteresis * speed * current**load.hysteresis_exponent
+    return replace(sizes, current=current, voltage=resistance * current + constant * speed, heat=heat, losses=losses)
 
 
 def _given(problem: Problem, i: int) -> list[float]:
@@ -95,7 +123,9 @@ def _free_duration(problem: Problem) -> float:
         for i, (name, factor) in enumerate(factors.items(), 1)
         if math.isfinite(_largest(problem, name))
     ]
-    if problem.limits.force is not None and problem.load.inertia is not None:
+    if problem.load.inertia is not None:
         mass = problem.load.inertia if isinstance(problem.load.inertia, float) else max(problem.load.inertia.value)
-        times.append(math.sqrt(4 * stroke * mass / _largest(problem, "force")))
+        low, high = available_force(problem, (0.0, 0.0))
+        if math.isfinite(strongest := max(abs(low), abs(high))):
+            times.append(math.sqrt(4 * stroke * mass / strongest))
     return max(times, default=1.0)

@@ -57,7 +57,7 @@ class Scheme:
         if signal.nodes is not None:
             if self.terms == 1:
                 return np.ones(len(steps) + 1)
-            return np.concatenate([steps, [0.0]]) / 2 + np.concatenate([[0.0], steps]) / 2
+            return trapezoids(steps)
         if self.terms == 1:
             return np.ones(len(steps))
         return steps if signal.degree == 0 else np.concatenate([steps, steps]) / 2
@@ -86,6 +86,11 @@ class Scheme:
         left = nodes[node] - nodes[: node + 1]
         effect[:node] = (left[:-1] ** depth - left[1:] ** depth) / factorial(depth)
         return effect
+
+
+def trapezoids(steps: Floats) -> Floats:
+    """(N+1,) the weights of the trapezoidal rule."""
+    return np.asarray(np.concatenate([steps, [0.0]]) / 2 + np.concatenate([[0.0], steps]) / 2)
 
 
 EXACT = Scheme("exact", terms=4, accuracy=2)

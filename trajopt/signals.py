@@ -12,6 +12,7 @@ from math import comb
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 class Arithmetic(Protocol):
@@ -23,6 +24,9 @@ class Arithmetic(Protocol):
     def concatenate(self, parts: list[Any]) -> Any:
         """One vector of several."""
 
+    def squares(self, x: Any) -> Any:
+        """The vector x²."""
+
 
 class OnFloats:
     """The arithmetic of plain numpy arrays."""
@@ -33,8 +37,28 @@ class OnFloats:
     def concatenate(self, parts: list[Any]) -> Any:
         return np.concatenate(parts)
 
+    def squares(self, x: Any) -> Any:
+        return np.square(x)
+
+    def magnitude(self, x: Any) -> Any:
+        """|x|."""
+        return np.abs(x)
+
+    def raised(self, x: Any, exponent: float, size: float) -> tuple[Any, Any]:
+        """|x| to an exponent of one or more, and its slope in x."""
+        return np.abs(x) ** exponent, exponent * np.abs(x) ** (exponent - 1) * np.sign(x)
+
     def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
-        """The sign of a velocity at the nodes, and on the intervals (of its mean: it must not change on one)."""
+        """The sign of a velocity at the nodes, and at the ends of the intervals."""
+        nodes = np.sign(velocity.nodes)
+        return nodes, (nodes[:-1], nodes[1:])
+
+
+class BetweenReversals(OnFloats):
+    """The arithmetic of arrays where no velocity changes its sign between nodes."""
+
+    def signs(self, velocity: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
+        """The sign of a velocity at the nodes, and of its mean on the intervals, whose ends may rest."""
         return np.sign(velocity.nodes), (np.sign(np.mean(velocity.pieces or (np.zeros(1),), axis=0)),)
 
 
@@ -56,6 +80,27 @@ class Signal:
         if self.nodes is not None:
             return self.nodes
         return self.pieces[0] if self.degree == 0 else model.concatenate([self.pieces[0], self.pieces[-1]])
+
+    def within(self, model: Arithmetic, s: float) -> Any:
+        """(N,) the values at a fraction ``s`` of every interval."""
+        n = self.degree
+        terms = [model.times(comb(n, i) * s**i * (1 - s) ** (n - i), x) for i, x in enumerate(self.pieces)]
+        return sum(terms[1:], terms[0])
+
+    def ends(self, at_nodes: bool) -> list[Any]:
+        """The values at the nodes, or at the left and at the right ends of the intervals."""
+        return [self.nodes] if at_nodes else [self.pieces[0], self.pieces[-1]]
+
+
+def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points on [0, 1] and their shares: the mean of any polynomial of degree 2·count - 1, exactly."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return (points + 1) / 2, weights / 2
+
+
+def sampled(ends: list[Any]) -> Signal:
+    """The signal of which only the values at the nodes are known, or those at both ends of every interval."""
+    return Signal(ends[0], ()) if len(ends) == 1 else Signal(None, tuple(ends))
 
 
 def constant(value: Any, intervals: int) -> Signal:

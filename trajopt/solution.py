@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -71,7 +72,8 @@ class Solution:
 
     @property
     def frame(self) -> pd.DataFrame:
-        """One row a node: time (s), position, velocity, … (m or rad, and per s), force (N, N m) and power (W).
+        """One row a node: time (s), position, velocity, … (m or rad, and per s), force (N, N m), power (W), and with a
+        motor current (A), voltage (V) and electrical power (W).
 
         The top derivative is the value on the interval that starts at the node; the last row repeats it (exact) or
         is 0 (euler). ``frame.attrs["units"]`` names the unit of each column. Raises NoSolution.
@@ -85,7 +87,8 @@ class Solution:
         return self._moved().at(t)
 
     def plot(self) -> list[Axes]:
-        """Stacked axes of position, velocity, acceleration, jerk and power with their limits. Raises NoSolution."""
+        """Stacked axes of position, velocity, …, power, current with their limits (see `trajopt.plot`). Raises
+        NoSolution."""
         from trajopt.plot import plot
 
         self._moved()
@@ -142,6 +145,10 @@ class Solution:
             "trajectory": None if self.trajectory is None else self.trajectory.to_dict(),
         }
 
+    def sealed(self, **extra: Any) -> dict[str, Any]:
+        """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
+        return seal(self.to_dict() | extra)
+
     def save(self, directory: str | Path) -> list[Path]:
         """Write result.json, trajectory.csv, trajectory.png, prices.png and, where vibration is limited, vibration.png
         into ``directory``; returns the paths.
@@ -160,7 +167,7 @@ class Solution:
         written = [directory / "result.json"]
         for stale in ("trajectory.csv", *pictures):  # of another answer
             (directory / stale).unlink(missing_ok=True)
-        write_atomically(written[0], json.dumps(self.to_dict(), indent=1, allow_nan=False).encode())
+        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
         if self.trajectory is None:
             return written
         written.append(directory / "trajectory.csv")
@@ -176,6 +183,12 @@ class Solution:
     def __repr__(self) -> str:
         value = "" if self.objective is None else f", objective={self.objective:.9g}, duration={self.duration:.9g}"
         return f"<Solution {self.status.value}{value}>"
+
+
+def seal(data: dict[str, Any]) -> dict[str, Any]:
+    """The content of a result file with its seal."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
 
 
 def _version() -> str:

@@ -97,9 +97,16 @@ def _coasting(setting: Setting) -> Attempt | None:
     still = Trajectory(
         problem, setting.mesh, setting.scheme, sizes, duration, problem.move.start_position or 0.0, tuple(chain)
     )
-    if still.measure(problem.objective):
+    if still.measure(problem.objective) or _may_earn(problem):
         return None
     return Attempt(Outcome(Claim.OPTIMAL, "coasting"), still, value=0.0, bound=0.0)
+
+
+def _may_earn(problem: Problem) -> bool:
+    """Whether the objective can be negative from an end to one of the same velocity: braking a load that has grown
+    heavier gives back more than speeding it up has taken."""
+    recovers = problem.load.recovery > 0 and not isinstance(problem.load.inertia, float)
+    return recovers and any(term.minimize == "electrical_energy" for term in problem.objective.terms)
 
 
 def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:

@@ -37,7 +37,8 @@ def as_chain(problem: Problem) -> Chain | None:
     the force is an acceleration in disguise.
     """
     move, limits = problem.move, problem.limits.given()
-    more = move.via or problem.vibration or problem.transcription.scheme != "exact" or "power" in limits
+    kinematic = limits.keys() <= {*DERIVATIVES, "force"}
+    more = move.via or problem.vibration or problem.transcription.scheme != "exact" or not kinematic
     timed = move.time == FREE and [term.minimize for term in problem.objective.terms] == ["time"]
     if more or not timed or any(limit.varies for limit in limits.values()):
         return None

@@ -25,6 +25,9 @@ SYMBOLS = {
     "snap": "s",
     "force": "F",
     "power": "P",
+    "current": "i",
+    "voltage": "U",
+    "electrical_power": "Pe",
 }
 
 
@@ -36,8 +39,9 @@ def frame(trajectory: Trajectory) -> pd.DataFrame:
         if i == trajectory.order:
             values = np.append(values, 0.0 if trajectory.scheme.terms == 1 else values[-1])
         columns[name] = values + trajectory.origin if i == 0 else values
-    if trajectory.problem.load.inertia is not None:
-        for name in ("force", "power"):
+    load = trajectory.problem.load
+    if load.inertia is not None:
+        for name in ("force", "power", *(("current", "voltage", "electrical_power") if load.motor else ())):
             signal = trajectory.signal(name)
             columns[name] = (
                 signal.nodes if signal.nodes is not None else np.append(signal.pieces[0], signal.pieces[-1][-1])

@@ -59,7 +59,9 @@ def _determines_profile(problem: Problem) -> bool:
 
     In anything lower it is too flat: the L2 norm of velocity at nodes leaves the jerk to ring at the cost of 1e-9.
     """
-    high = {*DERIVATIVES[problem.order - 1 :], *(("force",) if problem.order <= 3 else ())}
+    high = {*DERIVATIVES[problem.order - 1 :], *(("force", "current", "voltage") if problem.order <= 3 else ())}
+    if problem.order <= 3 and any(term.minimize == "copper_loss" for term in problem.objective.terms):
+        return True
     return any(t.minimize in high and t.norm is not None and t.norm.strictly_convex for t in problem.objective.terms)
 
 

@@ -14,7 +14,7 @@ from trajopt.problem import DERIVATIVES, Objective, Problem
 from trajopt.quantities import Quantities
 from trajopt.scaling import Sizes
 from trajopt.schemes import Scheme
-from trajopt.signals import OnFloats, Signal
+from trajopt.signals import BetweenReversals, OnFloats, Signal
 from trajopt.transcribe import Transcript
 
 
@@ -32,6 +32,7 @@ class Trajectory:
     duration: float
     origin: float
     chain: tuple[Floats, ...]
+    arithmetic: OnFloats = OnFloats()
 
     def __post_init__(self) -> None:
         for values in self.chain:
@@ -56,7 +57,7 @@ class Trajectory:
     @property
     def transcript(self) -> Transcript:
         """The trajectory as the builder sees it."""
-        model = OnFloats()
+        model = self.arithmetic
         steps = self.mesh.steps * self.duration
         quantities = Quantities(self.problem, model, self.scheme, self.mesh, self.sizes, list(self.chain), steps)
         return Transcript(
@@ -94,14 +95,14 @@ class Trajectory:
         return values
 
     def cut(self, times: Floats) -> Trajectory:
-        """The same exact trajectory with nodes added at ``times`` (s)."""
+        """The same exact trajectory with nodes added at ``times`` (s), those of its reversals among them."""
         mesh = Mesh(np.unique(np.concatenate([self.mesh.fractions, times / self.duration])))
         inner = mesh.fractions * self.duration
         values = self.at(np.minimum(inner, self.duration))
         chain = [values[name] for name in DERIVATIVES[: self.order + 1]]
         chain[0] = chain[0] - self.origin
         chain[-1] = chain[-1][:-1]
-        return replace(self, mesh=mesh, chain=tuple(chain))
+        return replace(self, mesh=mesh, chain=tuple(chain), arithmetic=BetweenReversals())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain lists, as in a result file."""

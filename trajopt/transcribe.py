@@ -17,7 +17,8 @@ from trajopt.preflight import at_time
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.quantities import Quantities
 from trajopt.scaling import Sizes, sizes_of
-from trajopt.schemes import SCHEMES, Scheme
+from trajopt.schemes import SCHEMES, Scheme, trapezoids
+from trajopt.signals import Signal, gauss
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -60,7 +61,8 @@ def drawn_in(setting: Setting, share: float) -> Setting:
 
     limits = {
         name: limit.model_copy(update={"min": side(name, limit.min, -1.0), "max": side(name, limit.max, 1.0)})
-        for name, limit in setting.problem.limits.given().items()
+        for name, limit in setting.problem.limits
+        if isinstance(limit, Limit)
     }
     problem = setting.problem
     return replace(setting, problem=problem.model_copy(update={"limits": problem.limits.model_copy(update=limits)}))
@@ -97,8 +99,9 @@ def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, 
         model.zero(chain[i][node] - value, sizes.derivative[i])
     known = setting.quantities(problem, model, scheme, mesh, sizes, chain, steps)
     transcript = Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen)
+    special = {"envelope": _envelope, "rms_force": _rms, "brake_energy": _brake}
     for name, limit in problem.limits.given().items():
-        _limit(transcript, name, limit)
+        special.get(name, _limit)(transcript, name, limit)
     for mode in problem.vibration:
         vibration.rows(transcript, mode)
     return transcript
@@ -174,8 +177,11 @@ def sides(problem: Problem, i: int, limit: Limit, duration: Any, fractions: Floa
 
 def _limit(transcript: Transcript, name: str, limit: Limit) -> None:
     """Rows that hold a limit between nodes (and, for what is no variable or is widened, at them)."""
+    _hold(transcript, name, transcript.quantities.signal(name), limit)
+
+
+def _hold(transcript: Transcript, name: str, signal: Signal, limit: Limit) -> None:
     problem, mesh, duration = transcript.problem, transcript.mesh, transcript.duration
-    signal = transcript.quantities.signal(name)
     i = DERIVATIVES.index(name) if name in DERIVATIVES else -1
     if i >= 0:
         at_nodes, places = node_limits(problem, i, mesh, duration), mesh.places(top=i == problem.order)
@@ -191,6 +197,52 @@ def _limit(transcript: Transcript, name: str, limit: Limit) -> None:
         if i >= 0:
             _skip_prescribed(problem, mesh, i, b, signal.degree, lower, upper)
         _rows(transcript, name, signal.pieces[b], (lower, upper), where)
+
+
+def _envelope(transcript: Transcript, name: str, limit: Limit) -> None:
+    """Force and speed below every side of the envelope; of a move one way, the sides that it can meet."""
+    envelope, way = transcript.problem.limits.envelope, transcript.problem.one_way
+    assert envelope is not None
+    for force, velocity in envelope.lines:
+        for sign in (1, -1) if force and velocity else (1,):
+            held = limit
+            if way and velocity:  # a·F + b·v from below, or from above, where v has one sign, follows from others
+                held = Limit(max=limit.max) if sign == way else Limit(min=limit.min)
+            _hold(transcript, name, transcript.quantities.mix(force, sign * velocity), held)
+
+
+def _rms(transcript: Transcript, name: str, limit: Limit) -> None:
+    """The RMS of force over the cycle, exactly: by Gauss points on the interval polynomials (Euler: trapezoids)."""
+    model, size, duration = transcript.model, transcript.sizes.of(name), transcript.duration
+    force, steps = transcript.quantities.signal("force"), transcript.mesh.steps
+    if force.pieces:
+        points, shares = gauss(force.degree + 1)
+        samples = model.concatenate([force.within(model, point) for point in points])
+        weights = np.concatenate([share * steps for share in shares])
+    else:
+        samples, weights = force.nodes, trapezoids(steps)
+    rms = model.variable(1)
+    cycle = (duration + transcript.problem.move.dwell) / duration
+    model.at_least_length(rms[0] * cycle**0.5, samples * (1 / size), np.sqrt(weights))
+    highest = np.array([limit.highest])
+    _rows(transcript, name, rms * size, (-np.inf * highest, highest), np.array([0.5]))
+
+
+def _brake(transcript: Transcript, name: str, limit: Limit) -> None:
+    """The energy that the motor feeds back, from above: by the Bernstein coefficients of what bounds its power."""
+    model, size, steps = transcript.model, transcript.sizes.of("electrical_power"), transcript.mesh.steps
+    returned = transcript.quantities.returned()
+    coefficients = list(returned.pieces) or [returned.nodes]
+    weights = steps / len(returned.pieces) if returned.pieces else trapezoids(steps)
+    energy: Any = 0.0
+    for values in coefficients:
+        bound = model.variable(len(weights))
+        model.nonpositive(values * (1 / size) - bound)
+        model.nonpositive(-bound)
+        energy = energy + model.total(weights, bound)
+    highest = np.array([limit.highest])
+    values = np.array([energy * transcript.duration * size], dtype=object)
+    _rows(transcript, name, values, (-np.inf * highest, highest), np.array([0.5]))
 
 
 def _skip_prescribed(problem: Problem, mesh: Mesh, i: int, b: int, degree: int, lower: Floats, upper: Floats) -> None:

@@ -99,6 +99,14 @@ _COMMON: Final = {
     "power": Kind("power", (2, 1, -3, 0, 0), "W", "100 W"),
     "frequency": Kind("frequency", (0, 0, -1, 0, 0), "Hz", "8 Hz"),
     "energy": Kind("energy", (2, 1, -2, 0, 0), "J", "1 J"),
+    "current": Kind("current", (0, 0, 0, 0, 1), "A", "5 A"),
+    "voltage": Kind("voltage", (2, 1, -3, 0, -1), "V", "48 V"),
+    "resistance": Kind("resistance", (2, 1, -3, 0, -2), "ohm", "3 ohm"),
+    "switching": Kind("switching loss", (2, 1, -3, 0, -1), "W/A", "4 W/A"),
+    "electrical_power": Kind("electrical power", (2, 1, -3, 0, 0), "W", "100 W"),
+    "electrical_energy": Kind("electrical energy", (2, 1, -2, 0, 0), "J", "1 J"),
+    "copper_loss": Kind("copper loss", (2, 1, -2, 0, 0), "J", "1 J"),
+    "brake_energy": Kind("braking energy", (2, 1, -2, 0, 0), "J", "1 J"),
 }
 LINEAR: Final = (
     _COMMON
@@ -106,7 +114,12 @@ LINEAR: Final = (
     | {
         "inertia": Kind("mass", (0, 1, 0, 0, 0), "kg", "10 kg"),
         "force": Kind("force", (1, 1, -2, 0, 0), "N", "50 N"),
+        "rms_force": Kind("RMS force", (1, 1, -2, 0, 0), "N", "20 N"),
+        "envelope": Kind("force at standstill", (1, 1, -2, 0, 0), "N", "50 N"),
         "viscous": Kind("viscous friction", (0, 1, -1, 0, 0), "N s/m", "2 N s/m"),
+        "torque_constant": Kind("force constant", (1, 1, -2, 0, -1), "N/A", "40 N/A"),
+        "eddy": Kind("eddy-current loss", (0, 1, -1, 0, -2), "W s^2/m^2/A^2", "1e-4 W s^2/m^2/A^2"),
+        "hysteresis": Kind("hysteresis loss", (1, 1, -2, 0, 0), "W s/m", "5e-3 W s/m"),
     }
 )
 ROTARY: Final = (
@@ -115,10 +128,18 @@ ROTARY: Final = (
     | {
         "inertia": Kind("inertia", (2, 1, 0, 0, 0), "kg m^2", "4e-4 kg m^2"),
         "force": Kind("torque", (2, 1, -2, 0, 0), "N m", "1.5 N m"),
+        "rms_force": Kind("RMS torque", (2, 1, -2, 0, 0), "N m", "0.6 N m"),
+        "envelope": Kind("torque at standstill", (2, 1, -2, 0, 0), "N m", "1.5 N m"),
         "viscous": Kind("viscous friction", (2, 1, -1, 0, 0), "N m s", "2e-4 N m s/rad"),
+        "torque_constant": Kind("torque constant", (2, 1, -2, 0, -1), "N m/A", "0.57 N m/A"),
+        "eddy": Kind("eddy-current loss", (2, 1, -1, 0, -2), "ohm s^2", "1e-4 ohm s^2"),
+        "hysteresis": Kind("hysteresis loss", (2, 1, -2, 0, 0), "W s", "5e-3 W s/rad"),
     }
 )
-_WITHOUT_ANGLE: Final = ("inertia", "force", "viscous", "power", "energy")
+_WITHOUT_ANGLE: Final = (
+    "inertia", "force", "rms_force", "envelope", "viscous", "power", "energy", "brake_energy", "torque_constant",
+    "eddy", "hysteresis",
+)  # fmt: skip
 
 
 def parse(text: str) -> tuple[float, Dimension, str]:
@@ -187,7 +208,7 @@ def to_si(text: str, kind: str, rotary: bool = False) -> float:
         value, dimension, unit = parse(text)
     except UnitError as error:
         raise UnitError(f"{error}; {article(wanted.name)} is needed, for example {wanted.example!r}") from None
-    if kind in _WITHOUT_ANGLE:  # a radian is a pure number in torque, inertia, friction and power
+    if kind in _WITHOUT_ANGLE:  # a radian is a pure number in torque, inertia, friction, power and loss
         dimension = (*dimension[:3], 0, dimension[4])
     if dimension != wanted.dimension:
         other = (LINEAR if rotary else ROTARY)[kind].dimension

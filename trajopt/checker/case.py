@@ -16,6 +16,9 @@ from trajopt.checker.report import Check, question, to_float
 
 DERIVATIVES: Final = ("position", "velocity", "acceleration", "jerk", "snap")
 LOADED: Final = ("force", "power")
+ELECTRICAL: Final = ("current", "voltage")
+POWERS: Final = {"energy": "power", "copper_loss": "copper power", "electrical_energy": "electrical power"}
+TOTALS: Final = ("rms_force", "brake_energy")  # limited over the whole move
 SPLITS: Final = 40  # halvings of one interval in search of a change of sign
 VALUE: Final = 1e-6  # of an objective, a metric or a gap
 BAND: Final = 41  # frequencies at which a band of them is looked at
@@ -71,6 +74,19 @@ class Mode:
 
 
 @dataclass(frozen=True)
+class Motor:
+    """What turns force into current (``constant``), losses, and which share of what it feeds back counts."""
+
+    constant: float
+    resistance: float
+    switching: float
+    eddy: float
+    hysteresis: float
+    exponent: float
+    recovery: float
+
+
+@dataclass(frozen=True)
 class Case:
     """A result with a solution. ``signal[i]`` is the i-th derivative: (N+1,) at nodes, the top one (N,)."""
 
@@ -85,6 +101,9 @@ class Case:
     inertia: Curve | None
     coulomb: float
     viscous: float
+    motor: Motor | None
+    mixes: dict[str, tuple[Fraction, Fraction]]  # what is a·force + b·velocity: (a, b)
+    dwell: float
     terms: tuple[tuple[str, str | None, float], ...]
     move_time: float | tuple[float, float] | None
     intervals: int
@@ -95,6 +114,7 @@ class Case:
     gap: float | None
     has_certificate: bool
     vibration: tuple[Mode, ...] = ()
+    rotary: bool = False
 
     @property
     def count(self) -> int:
@@ -142,10 +162,23 @@ class Case:
         At rest friction is not determined: its sign may be 0, +1, -1, or whatever rounding left of the velocity's. A
         claim that fits one of these is right.
         """
-        return range(4 if self.coulomb and "force" in quantities else 1)
+        return range(4 if self.coulomb and any(self.feels_friction_at_rest(name) for name in quantities) else 1)
+
+    def feels_friction_at_rest(self, name: str) -> bool:
+        """Whether a quantity is other than zero where the axis stands still and friction holds it."""
+        return name in self.mixes or POWERS.get(name, name) in ("copper power", "electrical power")
+
+    def is_loaded(self, name: str) -> bool:
+        """Whether a quantity is made of force."""
+        return name in self.mixes or name in POWERS.values()
+
+    @property
+    def turns(self) -> bool:
+        """Whether anything has a corner where the velocity changes its sign."""
+        return bool(self.coulomb or (self.motor is not None and self.motor.hysteresis))
 
     def depends_on_top(self, name: str) -> bool:
-        return (2 if name in LOADED else DERIVATIVES.index(name)) == self.order
+        return (2 if self.is_loaded(name) else DERIVATIVES.index(name)) == self.order
 
 
 def time_checks(case: Case) -> list[Check]:

@@ -37,6 +37,7 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
         return _report([*checks, question("structure", str(fault))], False, strict, notes)
     checks.append(question("structure"))
     if case is None:
+        notes.append(f"the verdict {result['status']} (its proof was checked when found, and is not in the file)")
         return _report(checks, strict, strict, notes)
     checks += [*time_checks(case), *certificate_checks(case, notes), *vibration_checks(case)]
     decided, rational = decide(case, strict, notes)
@@ -44,13 +45,14 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
 
 
 def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None = None, strict: bool = False) -> Report:
-    """Check the result file at ``path``, and a table (trajectory.csv, command.csv) beside a result.json, which must say
-    the same.
+    """Check the result file at ``path``, its seal, and a trajectory.csv or command.csv beside a result.json, which must
+    say the same.
 
     Raises CheckerInputError when the file cannot be read as JSON data at all.
     """
     result = read_json(Path(path))
     report = check(result, problem, strict=strict)
+    report = replace(report, checks=(question("seal", _seal_fault(result)), *report.checks))
     if result.get("format") == FORMAT:
         return replace(report, checks=(*report.checks, *steps_checks(Path(path), result)))
     table = Path(path).with_name("trajectory.csv")
@@ -96,6 +98,14 @@ def _identity(result: Mapping[str, Any], problem: Mapping[str, Any] | None) -> l
     if problem is not None:
         checks.append(question("same problem", "" if _same(problem, own) else "the result belongs to another problem"))
     return checks
+
+
+def _seal_fault(result: Mapping[str, Any]) -> str:
+    """Whether anything in the file was changed since it was written."""
+    if "seal" not in result:
+        return "missing: the file was edited, or not written by trajopt"
+    found = _hash({key: value for key, value in result.items() if key != "seal"})
+    return "" if result["seal"] == found else "broken: something in the file was edited"
 
 
 def _same(problem: Mapping[str, Any], own: Any) -> bool:

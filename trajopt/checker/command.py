@@ -49,6 +49,7 @@ def command_checks(result: Mapping[str, Any], notes: list[str]) -> list[Check]:
         with np.errstate(all="ignore"):
             commanded = read_command(result, notes)
             if commanded is None:
+                notes.append(f"the verdict {result['status']} (nothing in the file proves it)")
                 return [question("structure")]
             return [question("structure"), *_of_the_command(commanded), *_of_the_proof(commanded, notes)]
     except (Malformed, RecursionError) as fault:

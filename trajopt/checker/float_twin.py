@@ -9,8 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trajopt.checker.case import DERIVATIVES, EPS, LOADED, SPLITS, Array, Case, Curve
-from trajopt.checker.polynomials import absolute_integral, bernstein, highest, mean_square, product
+from trajopt.checker.case import DERIVATIVES, EPS, POWERS, SPLITS, Array, Case, Curve
+from trajopt.checker.polynomials import (
+    absolute_integral,
+    bernstein,
+    both_signs,
+    highest,
+    mean_square,
+    product,
+    values_at,
+)
 from trajopt.checker.report import Found, Number, to_float
 
 
@@ -32,7 +40,7 @@ class _Pieces(NamedTuple):
         return _Pieces(self.interval, self.offset, half).joined(_Pieces(self.interval, self.offset + half, half))
 
 
-class _Instants(NamedTuple):
+class Instants(NamedTuple):
     """Where a quantity is sampled: nodes (or intervals, for the top derivative) and the weight of each sample."""
 
     node: NDArray[np.intp]
@@ -107,7 +115,7 @@ class FloatTwin:
     def one_way(self) -> _Pieces:
         """The pieces, split where friction changes its direction."""
         mixed, done = self.pieces, []
-        for _ in range(SPLITS if self.case.coulomb else 0):
+        for _ in range(SPLITS if self.case.turns else 0):
             velocity = bernstein(self.rows(1, mixed))
             whole = np.all(velocity >= -self.case.rest, axis=1) | np.all(velocity <= self.case.rest, axis=1)
             done.append(mixed.take(whole))
@@ -119,7 +127,7 @@ class FloatTwin:
         return _Pieces(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
 
     def pieces_of(self, name: str) -> _Pieces:
-        return self.one_way if name in LOADED else self.pieces
+        return self.one_way if self.case.is_loaded(name) else self.pieces
 
     def rows(self, i: int, pieces: _Pieces) -> Array:
         """Coefficients (pieces, order - i + 1) of the i-th derivative."""
@@ -150,17 +158,20 @@ class FloatTwin:
         ``at_rest`` is the friction where the axis stands still.
         """
         if (name, at_rest) not in self.drawn:
-            loaded = name in LOADED
+            loaded = self.case.is_loaded(name)
             rows = self.loaded_rows(name, at_rest) if loaded else self.rows(DERIVATIVES.index(name), self.pieces)
             self.drawn[name, at_rest] = rows, bernstein(rows)
         return self.drawn[name, at_rest]
 
     def loaded_rows(self, name: str, at_rest: float) -> Array:
-        """Coefficients of force or power on the pieces of one direction."""
+        """Coefficients of force, of a mix of it and velocity, or of power on the pieces of one direction."""
         assert self.case.inertia is not None
         velocity = self.rows(1, self.one_way)
         if name == "power":
             return product(self.polynomial("force", at_rest)[0], velocity)
+        if name != "force":
+            a, b = map(float, self.case.mixes[name])
+            return a * self.polynomial("force", at_rest)[0] + b * velocity
         inertia, acceleration = self.case.inertia, self.rows(2, self.one_way)
         force = self.case.viscous * velocity  # of one degree more than acceleration, enough for a linear inertia
         if len(inertia.value) == 1:
@@ -179,38 +190,53 @@ class FloatTwin:
 
     # at the nodes
 
-    def instants(self, name: str) -> _Instants:
+    def instants(self, name: str) -> Instants:
         """The samples of a quantity and what each stands for (s; 1 in the plain sums of the Euler scheme)."""
         count, interval = self.case.count, np.arange(self.case.count)
         if not self.case.depends_on_top(name):
             weight = np.zeros(count + 1)
             weight[:-1] += self.step / 2
             weight[1:] += self.step / 2
-            found = _Instants(np.arange(count + 1), np.minimum(np.arange(count + 1), count - 1), weight)
-        elif name in LOADED:
+            found = Instants(np.arange(count + 1), np.minimum(np.arange(count + 1), count - 1), weight)
+        elif self.case.is_loaded(name):
             both = np.concatenate([interval, interval])
-            found = _Instants(np.concatenate([interval, interval + 1]), both, np.tile(self.step / 2, 2))
+            found = Instants(np.concatenate([interval, interval + 1]), both, np.tile(self.step / 2, 2))
         else:
-            found = _Instants(interval, interval, self.step)
+            found = Instants(interval, interval, self.step)
         return found._replace(weight=np.ones_like(found.weight)) if self.euler else found
 
-    def sampled(self, i: int, instants: _Instants) -> Array:
+    def sampled(self, i: int, instants: Instants) -> Array:
         return self.case.signal[i][instants.interval if i == self.case.order else instants.node]
 
     def samples(self, name: str, convention: int = 0) -> tuple[Array, Array]:
         """Values and weights; for ``convention`` see `Case.conventions`."""
         instants = self.instants(name)
-        if name not in LOADED:
+        if not self.case.is_loaded(name):
             return self.sampled(DERIVATIVES.index(name), instants), instants.weight
         velocity = self.sampled(1, instants)
-        friction = self.case.coulomb * _friction_signs(velocity, self.case.rest)[convention]
+        friction = self.case.coulomb * friction_signs(velocity, self.case.rest)[convention]
         return self.loaded(name, instants, velocity, friction), instants.weight
 
-    def loaded(self, name: str, instants: _Instants, velocity: Array, friction: Array) -> Array:
+    def loaded(self, name: str, instants: Instants, velocity: Array, friction: Array) -> Array:
         assert self.case.inertia is not None
         inertia = self.case.inertia.at(self.case.time[instants.node])
         force = inertia * self.sampled(2, instants) + self.case.viscous * velocity + friction
-        return force if name == "force" else force * velocity
+        if name in self.case.mixes:
+            a, b = map(float, self.case.mixes[name])
+            return a * force + b * velocity
+        return force * velocity if name == "power" else self.drawn_power(name, force, velocity)
+
+    def drawn_power(self, name: str, force: Array, velocity: Array) -> Array:
+        """The power that heats the copper, or that the motor draws (negative: feeds back)."""
+        motor = self.case.motor
+        assert motor is not None
+        current = force / motor.constant
+        copper = motor.resistance * current**2
+        if name == "copper power":
+            return copper
+        iron = motor.eddy * (velocity * current) ** 2
+        iron += motor.hysteresis * np.abs(velocity) * np.abs(current) ** motor.exponent
+        return copper + iron + motor.switching * np.abs(current) + force * velocity
 
     def peak(self, name: str) -> float:
         """How large a quantity gets, never too small; of a position the largest excursion."""
@@ -229,12 +255,17 @@ class FloatTwin:
 
     def noise(self, name: str) -> float:
         """A generous bound on the rounding of any one value of a quantity."""
-        if name not in LOADED:
+        if not self.case.is_loaded(name):
             return 64 * EPS * self.magnitudes[DERIVATIVES.index(name)]
         assert self.case.inertia is not None
         inertia = max(abs(value) for value in self.case.inertia.value)
         force = inertia * self.magnitudes[2] + self.case.viscous * self.magnitudes[1] + self.case.coulomb
-        return 64 * EPS * force * (1.0 if name == "force" else self.magnitudes[1])
+        if name in self.case.mixes:
+            a, b = map(float, self.case.mixes[name])
+            return 64 * EPS * (abs(a) * force + abs(b) * self.magnitudes[1])
+        if name == "power":
+            return 64 * EPS * force * self.magnitudes[1]
+        return 64 * EPS * float(self.drawn_power(name, np.array(force), np.array(self.magnitudes[1])))
 
     # answers
 
@@ -248,10 +279,21 @@ class FloatTwin:
         worst = max(found, key=lambda one: (math.isnan(one.violation), one.violation))
         return worst._replace(rounding=self.noise(name))
 
+    def total(self, name: str) -> float:
+        """An RMS over the cycle or an energy of the move, with the friction at rest that makes the least of it."""
+        least = min(to_float(value) for value in self.metric(name)[:-1])
+        cycle = self.case.end_time + self.case.dwell
+        return least * math.sqrt(self.case.end_time / cycle) if name == "rms_force" else least
+
+    def excess_in_total(self, name: str) -> Found:
+        limit = self.case.limits[name][1]
+        assert limit is not None
+        return Found(max(self.total(name) - limit.value[0], 0.0), None, to_float(self.metric(name)[-1]))
+
     def excess_at_nodes(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
         instants = self.instants(name)
         values = self.samples(name)[0]
-        if name == "force":
+        if name in self.case.mixes:
             velocity = self.sampled(1, instants)
             sign = np.where(np.abs(velocity) <= self.case.rest, -side, np.sign(velocity))
             values = self.loaded(name, instants, velocity, self.case.coulomb * sign)
@@ -261,7 +303,7 @@ class FloatTwin:
         return Found(float(over[k]), float(time[k])) if over[k] > 0 else Found(0.0)
 
     def excess_between(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
-        rows = self.polynomial(name, -side * self.case.coulomb if name in LOADED else 0.0)[1]
+        rows = self.polynomial(name, -side * self.case.coulomb if self.case.is_loaded(name) else 0.0)[1]
         over = side * (rows - self.limit_rows(limit, self.pieces_of(name), rows.shape[1] - 1))
         slack = tolerance * 1e-3
         if np.max(over) <= slack:
@@ -289,22 +331,30 @@ class FloatTwin:
         """The value and rounding of one term without its weight; a norm we do not know counts as nothing."""
         if name == "time":
             return self.case.duration, 0.0
-        quantity = "power" if name == "energy" else name
+        quantity = POWERS.get(name, name)
         values, weights = self.samples(quantity, convention)
-        if name == "energy":
-            norm, weights = "l1", np.full_like(weights, self.step[0]) if self.euler else weights
+        if name in POWERS:
+            weights = np.full_like(weights, self.step[0]) if self.euler else weights
+            if name != "energy":
+                values = self.counted(values) if name == "electrical_energy" else values
+                return float(weights @ values), self.noise(quantity) * float(np.sum(weights))
+            norm = "l1"
         elif name == "position":
             values = values - values[0]
         duration = 1.0 if self.euler else self.case.end_time
         noise = np.full_like(values, self.noise(quantity))
         return _norm(norm, values, weights, duration), _norm(norm, noise, weights, duration)
 
+    def counted(self, values: Array) -> Array:
+        """Electrical power as it counts: of what is fed back the share that is recovered."""
+        assert self.case.motor is not None
+        return np.where(values > 0, values, self.case.motor.recovery * values)
+
     def metric(self, name: str) -> list[Number]:
         """A metric for each convention of friction at rest, and its rounding."""
-        kind, _, quantity = name.partition("_")
-        quantity = quantity or {"energy": "power", "distance": "velocity"}[kind]
+        kind, quantity = metric_of(name)
         found = self.metric_at_nodes(kind, quantity) if self.euler else self.metric_between(kind, quantity)
-        span = self.case.end_time if kind in ("energy", "distance") else 1.0
+        span = 1.0 if kind in ("peak", "rms") else self.case.end_time
         return [*found, self.noise(quantity) * span + 1e-12 * to_float(found[0])]
 
     def metric_at_nodes(self, kind: str, quantity: str) -> list[Number]:
@@ -315,12 +365,16 @@ class FloatTwin:
             weights = self.step
         for convention in self.case.conventions(quantity):
             values = self.samples(quantity, convention)[0]
+            if kind in ("drawn", "fed back"):
+                values = self.counted(values) if kind == "drawn" else np.maximum(-values, 0.0)
+                found.append(float(weights @ values))
+                continue
             norm = {"peak": "linf", "rms": "l2"}.get(kind, "l1")
             found.append(_norm(norm, values, weights, self.case.end_time))
         return found
 
     def metric_between(self, kind: str, quantity: str) -> list[Number]:
-        coulomb = self.case.coulomb if quantity == "force" else 0.0
+        coulomb = self.case.coulomb if self.case.feels_friction_at_rest(quantity) else 0.0
         resting = (0.0, coulomb, -coulomb) if coulomb else (0.0,)
         if kind == "peak":  # friction at rest first as it makes the least of the peak
             found = [self.peak_between(quantity, -coulomb, coulomb)] if coulomb else []
@@ -329,14 +383,50 @@ class FloatTwin:
         if kind == "rms":
             squares = [mean_square(self.polynomial(quantity, at_rest)[0]) @ length for at_rest in resting]
             return [math.sqrt(square / self.case.end_time) for square in squares]
+        if kind == "copper":
+            assert self.case.motor is not None
+            squares = [mean_square(self.polynomial("current", at_rest)[0]) @ length for at_rest in resting]
+            return [self.case.motor.resistance * float(square) for square in squares]
+        if kind in ("drawn", "fed back"):
+            return [self.flow(kind, at_rest) for at_rest in resting]
         return [absolute_integral(self.polynomial(quantity)[1], length)]
+
+    @cached_property
+    def exchanged(self) -> float:
+        """The energy that goes to and fro, mechanical and as heat, J."""
+        return sum(to_float(self.metric(name)[0]) for name in ("energy", "copper_loss"))
+
+    def flow(self, kind: str, at_rest: float) -> float:
+        """The electrical energy of the move, or the energy fed back in it."""
+        assert self.case.motor is not None
+        force, velocity = self.polynomial("force", at_rest)[0], self.rows(1, self.one_way)
+        drawn, returned = both_signs(
+            lambda index, s: self.drawn_power(
+                "electrical power", values_at(force, index, s), values_at(velocity, index, s)
+            ),
+            self.one_way.length,
+        )
+        return drawn - self.case.motor.recovery * returned if kind == "drawn" else returned
 
     def peak_between(self, quantity: str, rest_above: float, rest_below: float) -> float:
         above, below = self.polynomial(quantity, rest_above)[1], self.polynomial(quantity, rest_below)[1]
         return highest(np.concatenate([above, -below]), 0.0, 1e-9)[0]
 
 
-def _friction_signs(velocity: Array, rest: float) -> list[Array]:
+def metric_of(name: str) -> tuple[str, str]:
+    """What kind of metric of which quantity a name asks for."""
+    special = {
+        "energy": ("l1", "power"),
+        "distance": ("distance", "velocity"),
+        "copper_loss": ("copper", "copper power"),
+        "electrical_energy": ("drawn", "electrical power"),
+        "brake_energy": ("fed back", "electrical power"),
+    }
+    kind, _, quantity = name.partition("_")
+    return special.get(name, (kind, quantity))
+
+
+def friction_signs(velocity: Array, rest: float) -> list[Array]:
     """Signs of friction at samples, by convention (see `Case.conventions`)."""
     sign = np.sign(velocity)
     resting = np.abs(velocity) <= rest

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
 from operator import mul
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajopt.checker.case import Array
 from trajopt.checker.report import to_float
 
+_DIVISION = 800  # what changes its sign and back within a tenth of such a part is nothing
+Integers: TypeAlias = NDArray[np.intp]
 Poly: TypeAlias = tuple[list[int], int]  # coefficients of powers (or Bernstein polynomials) of s, over one denominator
 
 
@@ -90,6 +94,47 @@ def absolute_integral(rows: Array, length: Array) -> float:
             break
         rows, length = _halves(rows), np.tile(length / 2, 2)
     return total
+
+
+def both_signs(function: Callable[[Integers, Array], Array], length: Array) -> tuple[float, float]:
+    """The integrals of max(0, f) and max(0, -f) over pieces; ``function`` gives f on pieces (n,) at s (n, points).
+
+    By Gauss points on a fine division, and on halves of halves where those do not yet agree: a corner costs a halving
+    for each bit.
+    """
+    points, shares = np.polynomial.legendre.leggauss(10)
+    points, shares = (points + 1) / 2, shares / 2
+
+    def means(index: Integers, start: Array, width: Array) -> Array:
+        values = function(index, start[:, None] + width[:, None] * points)
+        return np.stack([np.maximum(values, 0.0) @ shares, np.maximum(-values, 0.0) @ shares], axis=1)
+
+    each = -(-_DIVISION // len(length))
+    index, width = np.repeat(np.arange(len(length)), each), np.full(each * len(length), 1.0 / each)
+    start = np.tile(np.arange(each) / each, len(length))
+    coarse, total = means(index, start, width), np.zeros(2)
+    enough = 1e-13 * float(np.sum(coarse * (length[index] * width)[:, None])) / len(index)
+    for _ in range(60):
+        half = width / 2
+        fine = np.stack([means(index, start, half), means(index, start + half, half)])
+        span = (length[index] * half)[:, None]
+        sums = fine.sum(axis=0) * span
+        still_open = np.any(np.abs(sums - 2 * span * coarse) > enough, axis=1)
+        total += sums[~still_open].sum(axis=0)
+        if not np.any(still_open):
+            break
+        index, width = np.tile(index[still_open], 2), np.tile(half[still_open], 2)
+        start = np.concatenate([start[still_open], start[still_open] + half[still_open]])
+        coarse = fine[:, still_open].reshape(-1, 2)
+    return float(total[0]), float(total[1])
+
+
+def values_at(rows: Array, index: Integers, s: Array) -> Array:
+    """Polynomials (in powers) of the pieces ``index`` (n,) at s (n, points)."""
+    found = np.zeros_like(s)
+    for column in rows[index].T[::-1]:
+        found = found * s + column[:, None]
+    return found
 
 
 def mean_square(rows: Array) -> Array:
@@ -187,6 +232,33 @@ def absolute_integral_exactly(rows: list[Poly], lengths: list[Fraction]) -> Frac
         elif Fraction(max(map(abs, values)), unit) * length > enough:
             stack += [(half, length / 2) for half in _halves_exactly((values, unit))]
     return total
+
+
+def split_at_sign(
+    rows: list[tuple[Poly, Poly, Poly]], lengths: list[Fraction]
+) -> tuple[list[Poly], list[Fraction]]:
+    """From (p, f, g) in Bernstein form f where p is positive and g where it is negative, to 1e-13 of p's integral."""
+    found: list[Poly] = []
+    spans: list[Fraction] = []
+    stack = list(zip(rows, lengths, strict=True))
+    bounds = (to_float(Fraction(max(map(abs, p[0])), p[1]) * length) for (p, _, _), length in stack)
+    enough = Fraction(to_float(1e-13 * sum(bounds) / len(rows)))
+    while stack:
+        (p, f, g), length = stack.pop()
+        mixed = min(p[0]) < 0 < max(p[0])
+        if mixed and Fraction(max(map(abs, p[0])), p[1]) * length > enough:
+            halves = zip(*(_halves_exactly(row) for row in (p, f, g)), strict=True)
+            stack += [(half, length / 2) for half in halves]
+            continue
+        found.append(f if sum(p[0]) >= 0 else g)
+        spans.append(length)
+    return found, spans
+
+
+def integral_exactly(rows: list[Poly], lengths: list[Fraction]) -> Fraction:
+    """The integral of polynomials in Bernstein form."""
+    parts = zip(rows, lengths, strict=True)
+    return sum((Fraction(sum(values), unit * len(values)) * length for (values, unit), length in parts), Fraction(0))
 
 
 def square_integral(polys: list[Poly], lengths: list[Fraction]) -> Fraction:

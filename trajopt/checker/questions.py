@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from trajopt.checker.case import DERIVATIVES, EPS, VALUE, Case
+from trajopt.checker.case import DERIVATIVES, EPS, TOTALS, VALUE, Case
 from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.rational_twin import RationalTwin
 from trajopt.checker.report import Check, Found, Number, to_float
@@ -21,6 +21,7 @@ _STATE: Final = 1e-6
 _DEFECT: Final = 1e-9
 _DRIFT: Final = 1e-6
 _COORDINATE: Final = 1e-12
+_CANCELLED: Final = 1e-12  # of the energy that goes to and fro: a small difference of it is rounding
 _NORMS: Final = ("l1", "l2", "linf")
 
 Twin: TypeAlias = FloatTwin | RationalTwin
@@ -63,9 +64,13 @@ def tasks_of(case: Case, quick: FloatTwin, relative: float, notes: list[str]) ->
         tasks.append(_Task(f"drift {name}", _DRIFT * size + coordinate, methodcaller("drift", i)))
     tasks += _state_tasks(case)
     for name in case.limits:
+        if name in TOTALS:
+            tolerance = _limit_tolerance(case, name, to_float(quick.total(name)), relative)
+            tasks.append(_Task(f"limit {name}", tolerance, methodcaller("excess_in_total", name)))
+            continue
         tolerance = _limit_tolerance(case, name, quick.peak(name), relative)
         tasks.append(_Task(f"limit {name}", tolerance, methodcaller("excess", name, tolerance)))
-    return tasks + _value_tasks(case, notes)
+    return tasks + _value_tasks(case, quick, notes)
 
 
 def _state_tasks(case: Case) -> list[_Task]:
@@ -98,7 +103,7 @@ def _limit_tolerance(case: Case, name: str, peak: float, relative: float) -> flo
     return relative * min(largest or peak, peak) + coordinate
 
 
-def _value_tasks(case: Case, notes: list[str]) -> list[_Task]:
+def _value_tasks(case: Case, quick: FloatTwin, notes: list[str]) -> list[_Task]:
     """Objective and metrics: claimed against recomputed."""
     foreign = sorted({norm for _, norm, _ in case.terms if norm is not None and norm not in _NORMS})
     notes += [f"objective (norm {norm} is not the checker's)" for norm in foreign]
@@ -106,14 +111,18 @@ def _value_tasks(case: Case, notes: list[str]) -> list[_Task]:
     computable = metric_names(case)
     known = {*computable, *(f"residual_vibration_{k + 1}" for k in range(len(case.vibration)))}  # those have own checks
     notes += [f"metrics.{name}" for name in case.metrics if name not in known]
-    return tasks + [
-        _value_task(f"metric {name}", claimed, methodcaller("metric", name))
-        for name, claimed in case.metrics.items() if name in computable
-    ]  # fmt: skip
+    for name, claimed in case.metrics.items():
+        if name in computable:
+            floor = _CANCELLED * quick.exchanged if name in ("electrical_energy", "brake_energy") else 0.0
+            tasks.append(_value_task(f"metric {name}", claimed, methodcaller("metric", name), floor=floor))
+    return tasks
 
 
-def _value_task(name: str, claimed: float, values: Callable[[Twin], list[Number]], at_least: bool = False) -> _Task:
-    return _Task(name, VALUE * abs(claimed), lambda twin: _nearest_value(claimed, values(twin), at_least))
+def _value_task(
+    name: str, claimed: float, values: Callable[[Twin], list[Number]], at_least: bool = False, floor: float = 0.0
+) -> _Task:
+    tolerance = VALUE * abs(claimed) + floor
+    return _Task(name, tolerance, lambda twin: _nearest_value(claimed, values(twin), at_least))
 
 
 def _nearest_value(claimed: float, found: list[Number], at_least: bool) -> Found:
@@ -137,4 +146,6 @@ def metric_names(case: Case) -> tuple[str, ...]:
     names = [f"{kind}_{name}" for name in DERIVATIVES[1 : case.order + 1] for kind in ("peak", "rms")]
     if case.inertia is not None:
         names += ["energy", "peak_power", "rms_power", "peak_force", "rms_force"]
+    if case.inertia is not None and case.motor is not None:
+        names += ["peak_current", "rms_current", "peak_voltage", "copper_loss", "electrical_energy", "brake_energy"]
     return (*names, "distance")

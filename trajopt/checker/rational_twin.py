@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from trajopt.checker.case import DERIVATIVES, LOADED, SPLITS, Case, Curve
+from trajopt.checker.case import DERIVATIVES, POWERS, SPLITS, Case, Curve
+from trajopt.checker.float_twin import FloatTwin, metric_of
 from trajopt.checker.polynomials import (
     Poly,
     absolute_integral_exactly,
     bernstein_exactly,
     constant,
     highest_exactly,
+    integral_exactly,
     plus,
+    split_at_sign,
     square_integral,
     times,
 )
@@ -43,7 +47,7 @@ class RationalTwin:
     @cached_property
     def clock(self) -> int:
         ticks = max(float(t).as_integer_ratio()[1] for t in (*self.case.time.tolist(), *self.case.corners))
-        return ticks * self.case.count if self.euler else ticks << (SPLITS if self.case.coulomb else 0)
+        return ticks * self.case.count if self.euler else ticks << (SPLITS if self.case.turns else 0)
 
     @cached_property
     def unit(self) -> list[int]:
@@ -122,7 +126,7 @@ class RationalTwin:
     @cached_property
     def one_way(self) -> list[_Piece]:
         """The pieces, split where friction changes its direction."""
-        if not self.case.coulomb:
+        if not self.case.turns:
             return self.pieces
         done, mixed = [], [(piece, SPLITS) for piece in self.pieces]
         while mixed:
@@ -138,7 +142,7 @@ class RationalTwin:
         return done
 
     def pieces_of(self, name: str) -> list[_Piece]:
-        return self.one_way if name in LOADED else self.pieces
+        return self.one_way if self.case.is_loaded(name) else self.pieces
 
     def derivative(self, i: int, piece: _Piece) -> Poly:
         reach = self.case.order - i
@@ -168,7 +172,7 @@ class RationalTwin:
         return self.drawn[name, at_rest]
 
     def polynomial(self, name: str, piece: _Piece, at_rest: float) -> Poly:
-        if name not in LOADED:
+        if not self.case.is_loaded(name):
             return self.derivative(DERIVATIVES.index(name), piece)
         assert self.case.inertia is not None
         velocity = self.derivative(1, piece)
@@ -177,7 +181,10 @@ class RationalTwin:
             force = plus(force, times(constant(Fraction(self.case.viscous)), velocity))
         if self.case.coulomb:
             force = plus(force, constant(Fraction(self.friction(velocity, at_rest))))
-        return force if name == "force" else times(force, velocity)
+        if name == "power":
+            return times(force, velocity)
+        a, b = self.case.mixes[name]
+        return force if name == "force" else plus(times(constant(a), force), times(constant(b), velocity))
 
     def friction(self, velocity: Poly, at_rest: float) -> float:
         values, unit = bernstein_exactly(velocity)
@@ -195,7 +202,7 @@ class RationalTwin:
         if not self.case.depends_on_top(name):
             weights = [a + b for a, b in zip([Fraction(0), *half], [*half, Fraction(0)], strict=True)]
             found = [(k, min(k, count - 1), weight) for k, weight in enumerate(weights)]
-        elif name in LOADED:
+        elif self.case.is_loaded(name):
             found = [(k + end, k, half[k]) for end in (0, 1) for k in range(count)]
         else:
             found = [(k, k, 2 * half[k]) for k in range(count)]
@@ -208,7 +215,7 @@ class RationalTwin:
         """Values and weights; for ``convention`` see `Case.conventions`."""
         instants = self.instants(name)
         weights = [weight for _, _, weight in instants]
-        if name not in LOADED:
+        if not self.case.is_loaded(name):
             i = DERIVATIVES.index(name)
             return [self.sampled(i, node, k) for node, k, _ in instants], weights
         resting = (0, 1, -1, None)[convention]
@@ -224,7 +231,22 @@ class RationalTwin:
         inertia = self.case.inertia.exactly(Fraction(float(self.case.time[node])))
         force = inertia * self.sampled(2, node, interval) + Fraction(self.case.viscous) * velocity
         force += sign * Fraction(self.case.coulomb)
-        return force if name == "force" else force * velocity
+        if name in self.case.mixes:
+            a, b = self.case.mixes[name]
+            return a * force + b * velocity
+        return force * velocity if name == "power" else self.drawn_power(name, force, velocity)
+
+    def drawn_power(self, name: str, force: Fraction, velocity: Fraction) -> Fraction:
+        """See `FloatTwin.drawn_power`; a power that is no whole number is taken to 50 digits."""
+        motor = self.case.motor
+        assert motor is not None
+        current = force / Fraction(motor.constant)
+        copper = Fraction(motor.resistance) * current**2
+        if name == "copper power":
+            return copper
+        iron = Fraction(motor.eddy) * (velocity * current) ** 2
+        iron += Fraction(motor.hysteresis) * abs(velocity) * _raised(abs(current), motor.exponent)
+        return copper + iron + Fraction(motor.switching) * abs(current) + force * velocity
 
     # answers
 
@@ -237,11 +259,22 @@ class RationalTwin:
                 found.append(ask(name, side, limit, tolerance)._replace(note=label))
         return max(found, key=lambda one: one.violation)
 
+    def total(self, name: str) -> Fraction:
+        """See `FloatTwin.total`."""
+        least = min(Fraction(value) for value in self.metric(name)[:-1])
+        duration = Fraction(self.case.end_time)
+        return least * _root(duration / (duration + Fraction(self.case.dwell))) if name == "rms_force" else least
+
+    def excess_in_total(self, name: str) -> Found:
+        limit = self.case.limits[name][1]
+        assert limit is not None
+        return Found(max(self.total(name) - Fraction(limit.value[0]), Fraction(0)))
+
     def excess_at_nodes(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
         worst = Found(Fraction(0))
         plain = self.samples(name)[0]
         for value, (node, interval, _) in zip(plain, self.instants(name), strict=True):
-            if name == "force":
+            if name in self.case.mixes:
                 value = self.loaded(name, node, interval, -side)
             time = float(self.case.time[node])
             over = side * (value - limit.exactly(Fraction(time)))
@@ -250,7 +283,7 @@ class RationalTwin:
 
     def excess_between(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
         pieces = self.pieces_of(name)
-        powers, rows = self.polynomials(name, -side * self.case.coulomb if name in LOADED else 0.0)
+        powers, rows = self.polynomials(name, -side * self.case.coulomb if self.case.is_loaded(name) else 0.0)
         if len(limit.value) == 1:
             level, unit = limit.value[0].as_integer_ratio()
             over = [([side * (unit * x - level * scale) for x in values], scale * unit) for values, scale in rows]
@@ -279,17 +312,24 @@ class RationalTwin:
         """The value of one term without its weight; a norm we do not know counts as nothing."""
         if name == "time":
             return Fraction(self.case.duration)
-        values, weights = self.samples("power" if name == "energy" else name, convention)
-        if name == "energy":
-            norm, weights = "l1", [Fraction(self.ticks[1], self.clock)] * len(weights) if self.euler else weights
+        values, weights = self.samples(POWERS.get(name, name), convention)
+        if name in POWERS:
+            weights = [Fraction(self.ticks[1], self.clock)] * len(weights) if self.euler else weights
+            if name != "energy":
+                values = [self.counted(value) for value in values] if name == "electrical_energy" else values
+                return sum((w * x for w, x in zip(weights, values, strict=True)), Fraction(0))
+            norm = "l1"
         elif name == "position":
             values = [value - values[0] for value in values]
         return _norm_exactly(norm, values, weights, Fraction(1 if self.euler else self.case.end_time))
 
+    def counted(self, value: Fraction) -> Fraction:
+        assert self.case.motor is not None
+        return value if value > 0 else Fraction(self.case.motor.recovery) * value
+
     def metric(self, name: str) -> list[Number]:
         """A metric for each convention of friction at rest, and its rounding, none."""
-        kind, _, quantity = name.partition("_")
-        quantity = quantity or {"energy": "power", "distance": "velocity"}[kind]
+        kind, quantity = metric_of(name)
         return [*(self.metric_at_nodes if self.euler else self.metric_between)(kind, quantity), 0.0]
 
     def metric_at_nodes(self, kind: str, quantity: str) -> list[Fraction]:
@@ -302,11 +342,15 @@ class RationalTwin:
             weights = [step] * len(values)
             if not self.case.depends_on_top(quantity):
                 weights[0], weights[-1] = ends
+            if kind in ("drawn", "fed back"):
+                values = [self.counted(x) if kind == "drawn" else max(-x, Fraction(0)) for x in values]
+                found.append(sum((w * x for w, x in zip(weights, values, strict=True)), Fraction(0)))
+                continue
             found.append(_norm_exactly(norm, values, weights, Fraction(self.case.end_time)))
         return found
 
     def metric_between(self, kind: str, quantity: str) -> list[Fraction]:
-        coulomb = self.case.coulomb if quantity == "force" else 0.0
+        coulomb = self.case.coulomb if self.case.feels_friction_at_rest(quantity) else 0.0
         resting = (0.0, coulomb, -coulomb) if coulomb else (0.0,)
         if kind == "peak":
             found = [self.peak_between(quantity, -coulomb, coulomb)] if coulomb else []
@@ -315,7 +359,36 @@ class RationalTwin:
         if kind == "rms":
             squares = [square_integral(self.polynomials(quantity, at_rest)[0], lengths) for at_rest in resting]
             return [_root(square / Fraction(self.case.end_time)) for square in squares]
+        if kind == "copper":
+            assert self.case.motor is not None
+            squares = [square_integral(self.polynomials("current", at_rest)[0], lengths) for at_rest in resting]
+            return [Fraction(self.case.motor.resistance) * square for square in squares]
+        if kind in ("drawn", "fed back"):
+            return [self.flow(kind, at_rest, lengths) for at_rest in resting]
         return [absolute_integral_exactly(self.polynomials(quantity)[1], lengths)]
+
+    def flow(self, kind: str, at_rest: float, lengths: list[Fraction]) -> Fraction:
+        """See `FloatTwin.flow`, whose own number it is where the exponent leaves no polynomial."""
+        motor = self.case.motor
+        assert motor is not None
+        if motor.hysteresis and motor.exponent != 2:
+            return Fraction(FloatTwin(self.case).flow(kind, at_rest))
+        currents, powers = self.polynomials("current", at_rest)[0], self.polynomials("power", at_rest)[0]
+        rows = []
+        for piece, u, mechanical in zip(self.one_way, currents, powers, strict=True):
+            v = self.derivative(1, piece)
+            square = times(u, u)
+            even = plus(mechanical, times(constant(Fraction(motor.resistance)), square))
+            even = plus(even, times(constant(Fraction(motor.eddy)), times(square, times(v, v))))
+            way = 1 if sum(bernstein_exactly(v)[0]) >= 0 else -1
+            even = plus(even, times(constant(way * Fraction(motor.hysteresis)), times(square, v)))
+            odd = times(constant(Fraction(motor.switching)), u)
+            ahead, behind = plus(even, odd), plus(even, ([-x for x in odd[0]], odd[1]))
+            rows.append((bernstein_exactly(u), bernstein_exactly(ahead), bernstein_exactly(behind)))
+        signed, spans = split_at_sign(rows, lengths)
+        net, gross = integral_exactly(signed, spans), absolute_integral_exactly(signed, spans)
+        drawn, returned = (gross + net) / 2, (gross - net) / 2
+        return drawn - Fraction(motor.recovery) * returned if kind == "drawn" else returned
 
     def peak_between(self, quantity: str, rest_above: float, rest_below: float) -> Fraction:
         above = self.polynomials(quantity, rest_above)[1]
@@ -335,6 +408,14 @@ def _norm_exactly(norm: str | None, values: list[Fraction], weights: list[Fracti
     if norm == "l2":
         return _root(sum((w * x * x for w, x in zip(weights, values, strict=True)), Fraction(0)) / duration)
     return max(abs(x) for x in values) if norm == "linf" else Fraction(0)
+
+
+def _raised(x: Fraction, exponent: float) -> Fraction:
+    """A power of a number that is not negative; to 50 digits where the exponent is no whole number."""
+    if exponent == 2 or x == 0:
+        return x * x
+    with localcontext(prec=50):
+        return Fraction((Decimal(x.numerator) / Decimal(x.denominator)) ** Decimal(exponent))
 
 
 def _root(x: Fraction) -> Fraction:

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
 
-from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case, Curve, Mode, Via
+from trajopt.checker.case import (
+    DERIVATIVES,
+    ELECTRICAL,
+    LOADED,
+    POWERS,
+    TOTALS,
+    Array,
+    Case,
+    Curve,
+    Mode,
+    Motor,
+    Via,
+)  # fmt: skip
 
 FORMAT: Final = "trajopt result 1"
 WITH_SOLUTION: Final = ("SOLVED", "SOLVED_LOCAL")
@@ -15,6 +28,10 @@ WITHOUT_SOLUTION: Final = (
     "IMPOSSIBLE", "IMPOSSIBLE_ON_GRID", "UNDECIDED", "LIMIT", "BAD_INPUT", "CRASHED", "INTERRUPTED",
 )  # fmt: skip
 LARGEST_NUMBER: Final = 1e60
+_MOTOR: Final = (
+    "torque_constant", "resistance", "switching", "eddy", "hysteresis", "hysteresis_exponent", "recovery",
+)  # fmt: skip
+_LIMITED: Final = (*DERIVATIVES, *LOADED, *ELECTRICAL, *TOTALS)
 
 _NUMBERS: Final = ("objective", "duration", "metrics", "trajectory")
 _REQUIRED: Final = ("format", "trajopt", "status", "problem_hash", "problem", *_NUMBERS)
@@ -51,17 +68,20 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
     known = ("move", "limits", "load", "vibration", "objective", "transcription", "title", "source", "moral", "rotary")
     notes += [f"problem.{key}" for key in problem if key not in known]
     grid = _mapping(problem.get("transcription"), "problem.transcription")
-    move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via"))
-    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "coulomb", "viscous"))
-    limits = _limits(problem.get("limits", {}))
+    move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via", "dwell"))
+    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "coulomb", "viscous", *_MOTOR))
+    motor = _motor(load)
+    mixes = _mixes(motor)
+    limits = _limits(problem.get("limits", {}), mixes)
     terms = _terms(problem.get("objective"))
     order = _order(move, limits, terms, grid.get("scheme"))
     time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
     inertia = None if load.get("inertia") is None else _curve(load["inertia"], "load.inertia")
-    if inertia is None and any(name in LOADED for name in limits):
-        raise Malformed("a limit on force or power needs load.inertia")
-    if inertia is None and any(name in (*LOADED, "energy") for name, _, _ in terms):
-        raise Malformed("an objective of force, power or energy needs load.inertia")
+    named = {*limits, *(name for name, _, _ in terms)}
+    if inertia is None and named - {*DERIVATIVES, "time"}:
+        raise Malformed("a limit or an objective of force or power needs load.inertia")
+    if motor is None and named & {*ELECTRICAL, "brake_energy", "copper_loss", "electrical_energy"}:
+        raise Malformed("a limit or an objective of the motor needs load.torque_constant and load.resistance")
     return Case(
         scheme=grid["scheme"], order=order, time=time, signal=signal,
         start=_state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0),
@@ -69,13 +89,14 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
         via=_via(move.get("via", ()), order), limits=limits, inertia=inertia,
         coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
         viscous=_number(load.get("viscous", 0.0), "load.viscous"),
+        motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
         terms=terms, move_time=_move_time(move.get("time")), intervals=_whole(grid.get("intervals"), "intervals"),
         objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
         metrics={
             str(name): _number(value, f"metrics.{name}")
             for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
         },
-        vibration=_vibration(problem.get("vibration", ())),
+        vibration=_vibration(problem.get("vibration", ())), rotary=problem.get("rotary") is True,
         **_certificate(result.get("certificate")),
     )  # fmt: skip
 
@@ -154,15 +175,65 @@ def _curve(value: Any, where: str) -> Curve:
     return Curve(tuple(times.tolist()), tuple(values.tolist()))
 
 
-def _limits(value: Any) -> dict[str, tuple[Curve | None, Curve | None]]:
-    found = {}
-    for name, limit in _mapping(value, "problem.limits", (*DERIVATIVES, *LOADED)).items():
+def _motor(load: Mapping[str, Any]) -> Motor | None:
+    found = {key: _nonnegative(load[key], f"load.{key}") for key in _MOTOR if load.get(key) is not None}
+    if not (found.get("torque_constant") and found.get("resistance")):
+        if any(found.get(key) for key in _MOTOR[:5]):
+            raise Malformed("a motor needs load.torque_constant and load.resistance")
+        return None
+    exponent, recovery = found.get("hysteresis_exponent", 2.0), found.get("recovery", 0.0)
+    if not 1 < exponent <= 2 or recovery > 1:
+        raise Malformed(f"hysteresis_exponent {exponent!r} and recovery {recovery!r} are not those of a motor")
+    constant, resistance, switching, eddy, hysteresis = (found.get(key, 0.0) for key in _MOTOR[:5])
+    return Motor(constant, resistance, switching, eddy, hysteresis, exponent, recovery)
+
+
+def _mixes(motor: Motor | None) -> dict[str, tuple[Fraction, Fraction]]:
+    """What is a·force + b·velocity: the current F/Kt, and the voltage R F/Kt + Kt v."""
+    found = {"force": (Fraction(1), Fraction(0))}
+    if motor is not None:
+        constant, resistance = Fraction(motor.constant), Fraction(motor.resistance)
+        found |= {"current": (1 / constant, Fraction(0)), "voltage": (resistance / constant, constant)}
+    return found
+
+
+def _limits(
+    value: Any, mixes: dict[str, tuple[Fraction, Fraction]]
+) -> dict[str, tuple[Curve | None, Curve | None]]:
+    """(lower, upper) by name; an envelope as a limit on each of its sides, which join ``mixes``."""
+    found: dict[str, tuple[Curve | None, Curve | None]] = {}
+    for name, limit in _mapping(value, "problem.limits", (*_LIMITED, "envelope")).items():
+        if name == "envelope":
+            for side, mix, level in _sides(limit):
+                mixes[side], found[side] = mix, (Curve((0.0,), (-level,)), Curve((0.0,), (level,)))
+            continue
         sides = _mapping(limit, f"limits.{name}", ("min", "max"))
         low, high = (
             None if sides.get(side) is None else _curve(sides[side], f"limits.{name}.{side}") for side in ("min", "max")
         )
+        if name in TOTALS and (low is not None or high is None or len(high.value) > 1):
+            raise Malformed(f"limits.{name} must be one number, from above")
         found[name] = (low, high)
     return found
+
+
+def _sides(value: Any) -> Iterator[tuple[str, tuple[Fraction, Fraction], float]]:
+    """The sides of a torque-speed envelope: plus-minus (force + slope·velocity) below a level, and the last speed."""
+    table = _mapping(value, "limits.envelope", ("speed", "force"))
+    speed, force = (_vector(table.get(key), f"limits.envelope.{key}").tolist() for key in ("speed", "force"))
+    slopes = [
+        (Fraction(strong) - Fraction(weak)) / (Fraction(fast) - Fraction(slow)) if fast > slow else Fraction(-1)
+        for slow, fast, strong, weak in zip(speed, speed[1:], force, force[1:], strict=False)
+    ]
+    falls = all(slope >= 0 for slope in slopes) and bool(slopes) and len(speed) == len(force)
+    if not falls or speed[0] != 0 or min(force) < 0 or force[0] <= 0:
+        raise Malformed("limits.envelope is none: speeds must increase from 0, forces fall and stay positive")
+    for k, slope in enumerate(slopes):
+        level = float(Fraction(force[k]) + slope * Fraction(speed[k]))
+        yield f"envelope {k + 1} forwards", (Fraction(1), slope), level
+        if slope:
+            yield f"envelope {k + 1} backwards", (Fraction(1), -slope), level
+    yield "envelope speed", (Fraction(0), Fraction(1)), speed[-1]
 
 
 def _terms(value: Any) -> tuple[tuple[str, str | None, float], ...]:
@@ -172,9 +243,9 @@ def _terms(value: Any) -> tuple[tuple[str, str | None, float], ...]:
     for term in terms if isinstance(terms, list | tuple) else ():
         term = _mapping(term, "an objective term", ("minimize", "norm", "weight"))
         name, norm = term.get("minimize"), term.get("norm")
-        if name not in (*DERIVATIVES, *LOADED, "energy", "time"):
+        if name not in (*DERIVATIVES, *LOADED, *ELECTRICAL, *POWERS, "time"):
             raise Malformed(f"the objective minimizes {shown(name)}, which this checker does not know")
-        if (norm is None) != (name in ("energy", "time")) or not isinstance(norm, str | None):
+        if (norm is None) != (name in (*POWERS, "time")) or not isinstance(norm, str | None):
             raise Malformed(f"the norm of {name} is {shown(norm)}")
         found.append((name, norm, _nonnegative(term.get("weight", 1.0), "weight")))
     if not found:

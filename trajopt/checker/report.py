@@ -96,7 +96,8 @@ class Report:
         if self.passed:
             unchecked = f"; not checked: {', '.join(self.not_checked)}" if self.not_checked else ""
             return f"passed {count}; worst {self.worst.name}, {self.worst.ratio:.2g} of its tolerance{unchecked}"
-        return f"FAILED {len(self.failed)} of {count}: {self.worst}"
+        worst = sorted(self.failed, key=lambda check: -check.ratio)[:3]
+        return f"FAILED {len(self.failed)} of {count}: {'; '.join(map(str, worst))}"
 
 
 def question(name: str, fault: str = "") -> Check:

@@ -13,12 +13,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from trajopt.checker.case import DERIVATIVES, Array, Case
+from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case
+from trajopt.checker.float_twin import FloatTwin, Instants, friction_signs
 from trajopt.checker.reading import shown
 
 LARGEST_FILE: Final = 512 * 2**20
-_COLUMNS: Final = {"time": "t", "position": "q", "velocity": "v", "acceleration": "a", "jerk": "j", "snap": "s"}
+_COLUMNS: Final = {
+    "time": "t", "position": "q", "velocity": "v", "acceleration": "a", "jerk": "j", "snap": "s",
+    "force": "F", "power": "P",
+}  # fmt: skip
 _PRINTED: Final = 1e-15
+_COMPUTED: Final = 1e-12  # of the largest, for what the result does not hold and rounding moves
 
 
 class CheckerInputError(ValueError):
@@ -85,15 +90,39 @@ def table_fault(path: Path, case: Case | None, notes: list[str]) -> str:
     header = [cell.strip() for cell in rows[0]] if rows else []
     if len(rows) != case.count + 2:
         return f"has {max(len(rows) - 1, 0)} rows where {case.count + 1} belong"
-    expected = dict(zip(("time", *DERIVATIVES), (case.time, *_columns(case)), strict=False))
+    expected = dict(zip(("time", *DERIVATIVES), ([case.time], *([x] for x in _columns(case))), strict=False))
+    if case.inertia is not None:
+        expected |= {name: _loaded(case, name) for name in LOADED}
     letters = {_COLUMNS[name]: name for name in expected}
     found = [letters.get(cell.partition(" ")[0]) for cell in header]
     notes += [f"trajectory.csv {shown(cell)}" for cell, name in zip(header, found, strict=True) if name is None]
-    if sorted(filter(None, found)) != sorted(expected):
-        return f"needs one column each of {', '.join(letters)}; its header is {shown(','.join(header))}"
+    length = "rad" if case.rotary else "m"
+    for cell, name in zip(header, found, strict=True):
+        if name is not None and cell != f"{_COLUMNS[name]} [{(unit := _unit(name, length))}]":
+            return f"header {shown(cell)}: {name} is in {unit}"
+    named, needed = sorted(filter(None, found)), sorted(name for name in expected if name not in LOADED)
+    if len(set(named)) != len(named) or not set(needed) <= set(named):
+        columns = ", ".join(_COLUMNS[name] for name in expected if name not in LOADED)
+        return f"needs one column each of {columns}; its header is {shown(','.join(header))}"
     if any(len(row) != len(header) for row in rows):
         return "is truncated: a row has more or fewer cells than the header"
     return _column_faults(rows, found, expected)
+
+
+def _unit(name: str, length: str) -> str:
+    if name in ("force", "power"):
+        return "W" if name == "power" else "N" if length == "m" else "N m"
+    order = ("time", *DERIVATIVES).index(name) - 1
+    return "s" if order < 0 else length + ("", "/s", "/s^2", "/s^3", "/s^4")[order]
+
+
+def _loaded(case: Case, name: str) -> list[Array]:
+    """Force or power at the nodes, for each convention of friction at rest."""
+    twin, count = FloatTwin(case), case.count
+    nodes = np.arange(count + 1)
+    instants = Instants(nodes, np.minimum(nodes, count - 1), np.ones(count + 1))
+    velocity = case.signal[1]
+    return [twin.loaded(name, instants, velocity, case.coulomb * s) for s in friction_signs(velocity, case.rest)]
 
 
 def _columns(case: Case) -> tuple[Array, ...]:
@@ -102,7 +131,7 @@ def _columns(case: Case) -> tuple[Array, ...]:
     return (*case.signal[:-1], np.append(top, 0.0 if case.scheme == "euler" else top[-1]))
 
 
-def _column_faults(rows: list[list[str]], names: list[str | None], expected: Mapping[str, Array]) -> str:
+def _column_faults(rows: list[list[str]], names: list[str | None], expected: Mapping[str, list[Array]]) -> str:
     for column, name in enumerate(names):
         if name is None:
             continue
@@ -110,8 +139,11 @@ def _column_faults(rows: list[list[str]], names: list[str | None], expected: Map
             given = np.array([float(row[column]) for row in rows[1:]])
         except ValueError as error:
             return f"column {name}: {error}"
-        differs = ~(np.abs(given - expected[name]) <= _PRINTED * np.abs(expected[name]))
+        off = np.min([np.abs(given - wanted) for wanted in expected[name]], axis=0)
+        largest = max(float(np.max(np.abs(wanted))) for wanted in expected[name])
+        computed = _COMPUTED * largest if name in LOADED else 0.0
+        differs = ~(off <= _PRINTED * np.abs(expected[name][0]) + computed)
         if np.any(differs):
             k = int(np.argmax(differs))
-            return f"row {k + 1}: {name} is {float(given[k])!r}, the result says {float(expected[name][k])!r}"
+            return f"row {k + 1}: {name} is {float(given[k])!r}, the result says {float(expected[name][0][k])!r}"
     return ""

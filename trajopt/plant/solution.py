@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -19,7 +18,7 @@ from trajopt.plant.exponentials import Floats
 from trajopt.plant.problem import PlantProblem
 from trajopt.plant.simulate import response
 from trajopt.routing import Route
-from trajopt.solution import Frozen
+from trajopt.solution import Frozen, seal
 from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -136,9 +135,7 @@ class PlantSolution:
 
     def sealed(self, **extra: Any) -> dict[str, Any]:
         """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
-        data = self.to_dict() | extra
-        text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
+        return seal(self.to_dict() | extra)
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write result.json, command.csv (17 digits), command.png and vibration.png into ``directory``; returns the
