@@ -25,7 +25,6 @@ import numpy as np
 from trajopt.checker.case import Array
 from trajopt.checker.command_reading import FORMAT, Commanded, read_command
 from trajopt.checker.linear_system import System, chain, series
-from trajopt.checker.reading import Malformed
 from trajopt.checker.report import Check, question
 from trajopt.checker.result_file import _text as read_text
 
@@ -52,10 +51,10 @@ def command_checks(result: Mapping[str, Any], notes: list[str]) -> list[Check]:
                 notes.append(f"the verdict {result['status']} (nothing in the file proves it)")
                 return [question("structure")]
             return [question("structure"), *_of_the_command(commanded), *_of_the_proof(commanded, notes)]
-    except (Malformed, RecursionError) as fault:
-        return [question("structure", str(fault) or "nested too deeply")]
     except np.linalg.LinAlgError as error:
         return [question("simulation", f"its numbers do not stay finite: {error}")]
+    except (ValueError, OverflowError, RecursionError) as fault:  # Malformed among them
+        return [question("structure", str(fault) or "nested too deeply")]
 
 
 def command_bound(result: Mapping[str, Any]) -> float | None:
@@ -64,7 +63,7 @@ def command_bound(result: Mapping[str, Any]) -> float | None:
         with np.errstate(all="ignore"):
             commanded = read_command({**result, "certificate": None}, [])
             proof = None if commanded is None else _proof(commanded)
-    except (Malformed, np.linalg.LinAlgError):
+    except ValueError:  # Malformed and LinAlgError among them
         return None
     return None if proof is None else proof[1]
 

@@ -29,6 +29,7 @@ _PLANT: Final = (
     "input", "final_value", "final_input", "robust",
 )  # fmt: skip
 _MOST_STATES: Final = 100
+_MOST_JUMPS: Final = 20_000
 _ONE: Final = 1e-3  # of their size: computed poles nearer than this are one
 
 
@@ -82,6 +83,8 @@ def read_command(result: Mapping[str, Any], notes: list[str]) -> Commanded | Non
     time, levels = _vector(command.get("times"), "command.times"), _vector(command.get("levels"), "command.levels")
     if len(time) < 2 or time[0] != 0 or not np.all(np.diff(time) > 0):
         raise Malformed("command.times must start at 0 and increase")
+    if len(time) > _MOST_JUMPS:
+        raise Malformed(f"command.times has {len(time)} jumps; at most {_MOST_JUMPS} are checked")
     if len(levels) != len(time) - 1:
         raise Malformed(f"command.levels has {len(levels)} values where {len(time) - 1} belong")
     try:
@@ -109,8 +112,8 @@ def _plant(stated: Mapping[str, Any], duration: float) -> tuple[System, list[com
     """The plant of a problem and its poles, in times of ``duration`` (s)."""
     if stated.get("A") is not None:
         b, c = (_vector(stated.get(key), f"plant.{key}") for key in ("B", "C"))
-        rows = stated["A"] if isinstance(stated["A"], list | tuple) else ()
-        a = np.array([_vector(row, "plant.A") for row in rows]) if len({len(row) for row in rows}) == 1 else np.empty(0)
+        rows = [_vector(row, "plant.A") for row in (stated["A"] if isinstance(stated["A"], list | tuple) else ())]
+        a = np.array(rows) if len({len(row) for row in rows}) == 1 else np.empty(0)
         if not 0 < len(b) <= _MOST_STATES or a.shape != (len(b), len(b)) or len(c) != len(b):
             raise Malformed("plant: A, B and C do not fit together")
         a = a * duration
