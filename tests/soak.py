@@ -25,10 +25,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from tests import test_plant_random
 from tests.campaign import Record, draw, judge, remarks, shrunk
 
 STORE: Final = Path(__file__).parents[1] / ".soak"
 SPECS: Final = 20_000
+PLANTS: Final = 300
 MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
 PATIENCE: Final = 600.0  # s without any answer: the workers hang
 _RECYCLE: Final = 400  # specs a worker judges: solvers leak
@@ -45,13 +47,16 @@ def main(arguments: list[str] | None = None) -> int:
     else:
         records = list(_watched(_run(seeds, options.workers, since + options.seconds), len(seeds), console))
     summary = summarise(records, time.monotonic() - since)
+    if not options.show and not options.seeds:
+        summary["plants"] = {"count": options.plants, "faults": _plants(options.plants, options.workers)}
     _print(summary, console)
     if not options.show:
         STORE.mkdir(exist_ok=True)
         path = STORE / f"seed{options.seed}_{len(records)}.json"
         path.write_text(json.dumps(summary, indent=1))
         console.print(f"written: {path}")
-    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED)
+    faults = summary.get("plants", {}).get("faults")
+    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or bool(faults))
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
@@ -62,12 +67,30 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
+    parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
     parser.add_argument("--seeds", type=int, nargs="+", help="only the specs of these seeds")
     parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
     parser.add_argument(
         "--shrink", action="store_true", help="with --show: simplify what fails as far as it still does"
     )
     return parser.parse_args(arguments)
+
+
+def _plants(count: int, workers: int) -> dict[int, str]:
+    """What is wrong with the solutions of random plants, by seed."""
+    pool = _pool(workers)
+    try:
+        found = {seed: pool.submit(test_plant_random.fault, seed) for seed in range(count)}
+        return {seed: fault for seed, future in found.items() if (fault := _outcome(future))}
+    finally:
+        _end(pool)
+
+
+def _outcome(future: Future[str]) -> str:
+    try:
+        return future.result(timeout=PATIENCE)
+    except (BrokenProcessPool, TimeoutError) as error:
+        return f"crash: the process died or hung ({type(error).__name__})"
 
 
 def work(seed: int) -> Record:
@@ -201,6 +224,11 @@ def _print(summary: dict[str, Any], console: Console) -> None:
     for failure in summary["failures"]:
         for why in failure["why"]:
             console.print(f"seed {failure['seed']} {failure['status']}: {why}", highlight=False, markup=False)
+    if "plants" in summary:
+        plants = summary["plants"]
+        console.print(f"{plants['count']} linear plants, {len(plants['faults'])} not solved and proven")
+        for seed, fault in plants["faults"].items():
+            console.print(f"plant {seed}: {fault}", highlight=False, markup=False)
 
 
 if __name__ == "__main__":

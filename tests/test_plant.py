@@ -253,7 +253,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "shapes": (lambda: Plant.from_state_space(np.eye(2), np.ones(3), np.ones(2)), "one input and one output"),
     "u_ss outside": (lambda: time_optimal(LAG, -1, 1, u_ss=1.2), "outside the input limits"),
     "u_ss at the limit": (lambda: time_optimal(LAG, -1, 1, u_ss=1.0), "infinite time"),
-    "u_ss and y_f disagree": (lambda: time_optimal(LAG, -1, 1, u_ss=0.5, y_f=0.6), "leave one of them out"),
+    "u_ss and y_f disagree": (lambda: time_optimal(LAG, -1, 1, u_ss=0.5, y_f=0.6), "leave it out"),
     "no final value": (lambda: time_optimal(LAG, -1, 1), "u_ss: missing"),
     "no y_f": (lambda: time_optimal(RIGID, -1, 1), "y_f: missing"),
     "u_ss of a rigid body": (lambda: time_optimal(RIGID, -1, 1, u_ss=0.1, y_f=1), "moving"),

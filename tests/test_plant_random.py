@@ -1,30 +1,16 @@
-"""Random linear plants of two to seven states: the switching function proves every command."""
+"""Random linear plants of two to seven states: the independent check proves every command the shortest."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from trajopt.plant import Command, Plant, time_optimal
+import trajopt
+from trajopt.plant import Plant
+from trajopt.plant.problem import PlantProblem
 
 
-@dataclass(frozen=True)
-class Case:
-    """A plant with input limits and a final value."""
-
-    plant: Plant
-    umin: float
-    umax: float
-    y_f: float
-
-    def command(self) -> Command:
-        """Its minimum-time command."""
-        return time_optimal(self.plant, self.umin, self.umax, y_f=self.y_f)
-
-
-def random_case(seed: int) -> Case:
+def random_problem(seed: int) -> PlantProblem:
     """Real poles, pairs with damping ratio 0 to 0.9, up to two poles at zero, some of them repeated; time unit, input
     unit and output unit over six decades; asymmetric limits, moves from short to long."""
     rng = np.random.default_rng(seed)
@@ -45,25 +31,40 @@ def random_case(seed: int) -> Case:
             block = [complex(-rate * 10 ** rng.uniform(-0.7, 0.7))]
         copies = 2 if rng.random() < 0.2 and room >= 2 * len(block) else 1
         poles += block * copies
-    plant = Plant.from_poles(poles, gain=10 ** rng.uniform(-3, 3))
+    gain = 10 ** rng.uniform(-3, 3)
+    plant = Plant.from_poles(poles, gain=gain)
     unit = 10 ** rng.uniform(-3, 3)
     umin, umax = -unit * rng.uniform(0.3, 1.0), unit * rng.uniform(0.3, 1.0)
     if plant.rigid:
         y_f = plant.limit * unit / rate**plant.rigid * rng.choice([-1, 1]) * 10 ** rng.uniform(-1.5, 1.5)
     else:
         y_f = plant.limit * rng.uniform(0.95 * umin, 0.95 * umax)
-    return Case(plant, umin, umax, float(y_f))
+    return PlantProblem(plant={"poles": poles, "gain": gain, "input": (umin, umax), "final_value": float(y_f)})
 
 
-def check(seed: int) -> Command:
-    """The command of a random case, verified: sign of sigma, equations, simulated end."""
-    command = random_case(seed).command()
-    assert command.optimal, f"seed {seed}: margin {command.margin:g}"
-    assert max(abs(x) for x in command.residuals) <= 1e-11, f"seed {seed}"
-    assert command.end_error <= 1e-9, f"seed {seed}: end error {command.end_error:g}"
-    return command
+def fault(seed: int) -> str:
+    """What is wrong with the solution of a random plant; empty when the switching function, found twice, proves it, its
+    equations hold and both simulations end at rest."""
+    try:
+        solution = trajopt.solve(random_problem(seed))
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    command = solution.command
+    if solution.status is not trajopt.Verdict.SOLVED:
+        return f"{solution.status.value}: {solution.message}"
+    if not abs(solution.certificate["gap"]) <= 1e-7 or solution.audit["not_checked"]:
+        return f"gap {solution.certificate['gap']:.2g}, not checked: {solution.audit['not_checked']}"
+    residual = max(abs(x) for x in command.residuals)
+    exact = residual <= 1e-11 and command.end_error <= 1e-9
+    return "" if exact else f"residual {residual:.2g}, end off by {command.end_error:.2g}"
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_switching_function_of_random_plants(seed: int) -> None:
-    check(seed)
+def test_random_plants_are_proven(seed: int) -> None:
+    assert fault(seed) == ""
+
+
+def test_switches_that_meet_are_left_out() -> None:
+    solution = trajopt.solve(random_problem(99))  # sigma touches zero: an arc of no length
+    times = np.array([0.0, *solution.command.switches, solution.duration])
+    assert solution.status.solved and np.min(np.diff(times)) > 1e-6 * solution.duration

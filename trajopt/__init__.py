@@ -26,6 +26,8 @@ _HOMES = {
         ("Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Transcription"),
         "trajopt.problem",
     ),
+    **dict.fromkeys(("PlantProblem", "PlantSection", "Robust"), "trajopt.plant.problem"),
+    "PlantSolution": "trajopt.plant.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
     "Envelope": "trajopt.envelope",

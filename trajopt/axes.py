@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -13,9 +14,14 @@ from trajopt.problem import FREE, Objective, Problem, Term
 from trajopt.problem_file import explain
 from trajopt.solution import Solution
 
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
+
 
 def synchronise(
-    problems: Sequence[Problem], seconds: float | None = None, solve: Callable[..., Solution] = worker.solve
+    problems: Sequence[Problem | PlantProblem],
+    seconds: float | None = None,
+    solve: Callable[..., Solution] = worker.solve,
 ) -> list[Solution]:
     """One solution an axis, all of one duration (s): the least time of the slowest.
 
@@ -23,17 +29,20 @@ def synchronise(
     keeps its fastest move; every other minimises the L2 norm of its top derivative in the common time. Where an axis
     has no solution (look at ``status``), its verdict stands and the others are those of their own least times.
     ``seconds`` limits each solve; ``solve`` replaces `trajopt.solve`. Raises ValueError without any problem, and
-    BadInput for one that needs its fixed time.
+    BadInput for one that needs its fixed time or is a plant.
     """
     if not problems:
         raise ValueError("needs at least one problem to synchronise")
-    fastest = [solve(_in_time(problem, FREE, _TIME), seconds) for problem in problems]
+    moves = [problem for problem in problems if isinstance(problem, Problem)]
+    if len(moves) < len(problems):
+        raise BadInput("plant: only moves of axes can be synchronised; solve a plant by itself")
+    fastest = [solve(_in_time(problem, FREE, _TIME), seconds) for problem in moves]
     if not all(solution.status.solved for solution in fastest):
         return fastest
     common = max(solution.duration or 0.0 for solution in fastest)
     return [
         solution if solution.duration == common else solve(_in_time(problem, common, smoothest(problem)), seconds)
-        for problem, solution in zip(problems, fastest, strict=True)
+        for problem, solution in zip(moves, fastest, strict=True)
     ]
 
 

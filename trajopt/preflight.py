@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from trajopt import units
 from trajopt.fields import Limit
 from trajopt.problem import DERIVATIVES, ELECTRICAL, LOADED, MOST_INTERVALS, MOTOR, Problem, State
 from trajopt.rating import refuse_weak_motor
+
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
 
 SYMBOLS: Final = ("q", "v", "a", "j", "s")
 CLAMPED = 1e-9  # a boundary state outside its limit by this fraction of the limit is a rounding, not a contradiction
@@ -28,8 +31,11 @@ def refuse_contradictions(problem: Problem) -> None:
     refuse_weak_motor(problem)
 
 
-def warnings(problem: Problem) -> list[str]:
-    """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk."""
+def warnings(problem: Problem | PlantProblem) -> list[str]:
+    """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk. The
+    plain numbers of a plant give none away."""
+    if not isinstance(problem, Problem):
+        return []
     return [*_clamped(problem), *_wrong_units(problem), *_coarse(problem), *_heavy(problem)]
 
 

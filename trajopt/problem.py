@@ -353,6 +353,9 @@ def _printable(text: str) -> str:
     return text
 
 
+OneLine = Annotated[str, AfterValidator(_printable)]
+
+
 class Problem(Section):
     """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy."""
 
@@ -362,9 +365,9 @@ class Problem(Section):
     load: Load = Load()
     vibration: tuple[Vibration, ...] = ()
     transcription: Transcription = Transcription()
-    title: Annotated[str, AfterValidator(_printable)] = ""
-    source: Annotated[str, AfterValidator(_printable)] = ""
-    moral: Annotated[str, AfterValidator(_printable)] = ""
+    title: OneLine = ""
+    source: OneLine = ""
+    moral: OneLine = ""
     rotary: Annotated[bool, Field(strict=True)] = False
 
     @model_validator(mode="after")

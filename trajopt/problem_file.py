@@ -8,7 +8,7 @@ import stat
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import BaseModel, ValidationError
 
@@ -16,6 +16,9 @@ from trajopt import problem as p
 from trajopt import units
 from trajopt.errors import BadInput
 from trajopt.fields import nearest
+
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
 
 LARGEST_FILE: Final = 1_000_000  # bytes
 _DEEPEST: Final = 64  # nesting, and parts of a dotted key; tomllib takes quadratic time on more
@@ -31,6 +34,8 @@ _EXAMPLES: Final = {  # what to write for what is missing
     "move.time": 'write time = "1 s", or "free"',
     "move.end": 'write end = { position = "0.25 m" }',
     "move.via.time": 'write { time = "0.5 s", position = "0.1 m" }',
+    "plant.input": "write input = [-1.0, 1.0], or input = 1.0 for plus-minus",
+    "plant.final_value": "write final_value = 1.0",
     "vibration.frequency": 'write [[vibration]] with frequency = "8 Hz"',
     "objective": 'write [objective] with minimize = "jerk" and norm = "l2"',
     "objective.terms": 'write minimize = "jerk" and norm = "l2", or terms',
@@ -48,7 +53,7 @@ _ALIASES: Final = {
 }
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem:
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem:
     """The problem in a TOML file, or of a ready-made problem's name, with ``key=value`` overrides applied.
 
     Raises BadInput with one line naming the file, the field and the remedy.
@@ -57,7 +62,7 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
     return parse(read_text(source), overrides, name=str(path))
 
 
-def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem:
+def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem:
     """The problem stated by a TOML text. Raises BadInput."""
     _refuse_marks(text, name)
     _refuse_deep(text, name)
@@ -70,8 +75,10 @@ def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.
     return from_dict(data, name)
 
 
-def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem:
+def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem:
     """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
+    if "plant" in data:
+        return _plant(data, name)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
@@ -79,6 +86,18 @@ def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem:
         return p.Problem.model_validate({"rotary": rotary, **data}, context={"rotary": rotary, "texts_only": True})
     except ValidationError as error:
         raise _refused(name, _as_written(explain(error), written)) from None
+
+
+def _plant(data: dict[str, Any], name: str) -> PlantProblem:
+    from trajopt.plant.problem import PlantProblem
+
+    for key in ("move", "limits", "load", "vibration", "objective", "transcription", "rotary"):
+        if key in data:
+            raise _refused(name, f"{key}: belongs to an axis and cannot stand beside [plant]; leave one of them out")
+    try:
+        return PlantProblem.model_validate(data, context={"texts_only": True})
+    except ValidationError as error:
+        raise _refused(name, explain(error, PlantProblem)) from None
 
 
 def read_text(path: Path) -> str:
@@ -308,7 +327,7 @@ def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
         if model is None:
             return []
     aliases = _ALIASES.get(str(loc[-1]), {}) if loc else {}
-    extra = ["minimize", "norm", "weight"] if model is p.Objective else []
+    extra = ["minimize", "norm", "weight"] if model is p.Objective else ["plant"] if model is p.Problem else []
     return [*model.model_fields, *aliases, *extra]
 
 

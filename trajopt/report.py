@@ -12,8 +12,10 @@ from rich.table import Table
 from trajopt import units
 from trajopt.fields import Limit
 from trajopt.prices import sentence
+from trajopt.problem import Problem
 
 if TYPE_CHECKING:
+    from trajopt.plant.solution import PlantSolution
     from trajopt.solution import Solution
 
 _ROWS = ("velocity", "acceleration", "jerk", "snap", "force", "power", "current", "voltage")
@@ -25,8 +27,14 @@ _ENERGIES = {
 }
 
 
-def print_solution(solution: Solution) -> None:
+def print_solution(solution: Solution | PlantSolution) -> None:
     """Verdict, objective, duration, peaks and RMS with units, certificate, and who solved it and why."""
+    if not isinstance(solution.problem, Problem):
+        from trajopt.plant.report import print_command
+        from trajopt.plant.solution import PlantSolution
+
+        assert isinstance(solution, PlantSolution)
+        return print_command(solution)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     title = solution.problem.title
     console.print(solution.status.value, style="bold", end="")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Problem
 from trajopt.quantities import FORCES, is_affine
 from trajopt.switching_times import as_chain
+
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,14 @@ class Route:
         return dict(vars(self))
 
 
-def route(problem: Problem) -> Route:
-    """The route of a problem: switching times for the minimum time of a chain, else its curvature decides, unless
-    ``transcription.solver`` asks otherwise.
+def route(problem: Problem | PlantProblem) -> Route:
+    """The route of a problem: switching times for a plant and for the minimum time of a chain, else its curvature
+    decides, unless ``transcription.solver`` asks otherwise.
 
     Raises BadInput, with the reason, when the solver asked for cannot take the problem.
     """
+    if not isinstance(problem, Problem):
+        return Route("arcs", "newton", "minimum time of a linear plant: its switching times, exactly")
     wanted = problem.transcription.solver
     if wanted == "auto" and as_chain(_lean(problem)) is not None:
         return Route("arcs", "newton", "minimum time of a chain of integrators: its switching times, exactly")

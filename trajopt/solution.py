@@ -147,9 +147,7 @@ class Solution:
 
     def sealed(self, **extra: Any) -> dict[str, Any]:
         """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
-        data = self.to_dict() | extra
-        text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
+        return seal(self.to_dict() | extra)
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write result.json, trajectory.csv, trajectory.png, prices.png and, where vibration is limited, vibration.png
@@ -185,6 +183,12 @@ class Solution:
     def __repr__(self) -> str:
         value = "" if self.objective is None else f", objective={self.objective:.9g}, duration={self.duration:.9g}"
         return f"<Solution {self.status.value}{value}>"
+
+
+def seal(data: dict[str, Any]) -> dict[str, Any]:
+    """The content of a result file with its seal."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
 
 
 def _version() -> str:

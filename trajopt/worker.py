@@ -9,7 +9,7 @@ import multiprocessing
 import signal
 import threading
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 from trajopt.errors import BadInput
 from trajopt.problem import Problem
@@ -17,28 +17,38 @@ from trajopt.routing import route
 from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
+if TYPE_CHECKING:
+    from trajopt.plant.problem import PlantProblem
+    from trajopt.plant.solution import PlantSolution
+
 GRACE = 0.5  # s beyond the limit that a solver gets to stop by itself
 
 
-def solve(problem: Problem, seconds: float | None = None) -> Solution:
+@overload
+def solve(problem: Problem, seconds: float | None = None) -> Solution: ...
+@overload
+def solve(problem: PlantProblem, seconds: float | None = None) -> PlantSolution: ...
+def solve(problem: Problem | PlantProblem, seconds: float | None = None) -> Solution | PlantSolution:
     """Solve, check and certify; ``seconds`` limits the wall time, by solving in a process that can be ended.
 
-    Returns a Solution in every case; look at ``status``. Raises BadInput for a limit that is no positive time and when
-    the solver asked for cannot take the problem, MissingSolver when it is not installed, InternalError when a bound
-    exceeds a checked answer.
+    Returns a solution in every case; look at ``status``. Raises BadInput for a limit that is no positive time and when
+    the solver asked for cannot take the problem, or no command can do what is asked of a plant; MissingSolver when the
+    solver is not installed, InternalError when a bound exceeds a checked answer.
     """
-    from trajopt.solving import solve
-
     if seconds is None:
-        return solve(problem)
+        return _here(problem, None)
     if not 0 < seconds < float("inf"):
         raise BadInput(f"seconds: must be > 0 and finite, got {seconds!r}; leave it out for no limit")
     if multiprocessing.current_process().daemon:  # which may have no child of its own
-        return solve(problem, seconds)
+        return _here(problem, seconds)
     return solve_apart(problem, seconds)
 
 
-def solve_apart(problem: Problem, seconds: float | None = None) -> Solution:
+@overload
+def solve_apart(problem: Problem, seconds: float | None = None) -> Solution: ...
+@overload
+def solve_apart(problem: PlantProblem, seconds: float | None = None) -> PlantSolution: ...
+def solve_apart(problem: Problem | PlantProblem, seconds: float | None = None) -> Solution | PlantSolution:
     """`trajopt.solve` in a child process, which is ended at the limit (LIMIT) and on Ctrl-C; its death is CRASHED.
 
     Raises what `trajopt.solve` raises, and KeyboardInterrupt.
@@ -64,8 +74,19 @@ def solve_apart(problem: Problem, seconds: float | None = None) -> Solution:
             signal.signal(signal.SIGTERM, before)
     if isinstance(answer, BaseException):
         raise answer
-    assert isinstance(answer, Solution)
-    return answer
+    found: Solution | PlantSolution = answer
+    return found
+
+
+def _here(problem: Problem | PlantProblem, seconds: float | None) -> Solution | PlantSolution:
+    """Solve in this process."""
+    if not isinstance(problem, Problem):
+        from trajopt.plant.solving import solve as solve_plant
+
+        return solve_plant(problem, seconds)
+    from trajopt.solving import solve
+
+    return solve(problem, seconds)
 
 
 def _end_with_us() -> Any:
@@ -79,14 +100,12 @@ def _end_with_us() -> Any:
     return signal.signal(signal.SIGTERM, unwind)
 
 
-def _work(sender: Connection, problem: Problem, seconds: float | None) -> None:
+def _work(sender: Connection, problem: Problem | PlantProblem, seconds: float | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     answer: Any
     try:
-        from trajopt.solving import solve
-
-        answer = solve(problem, seconds)
+        answer = _here(problem, seconds)
     except Exception as error:
         error.add_note(_trace())
         answer = error
@@ -99,5 +118,9 @@ def _trace() -> str:
     return traceback.format_exc()
 
 
-def _ended(problem: Problem, verdict: Verdict, message: str) -> Solution:
+def _ended(problem: Problem | PlantProblem, verdict: Verdict, message: str) -> Solution | PlantSolution:
+    if not isinstance(problem, Problem):
+        from trajopt.plant.solution import PlantSolution
+
+        return PlantSolution(verdict, problem, route(problem), message=message)
     return Solution(verdict, problem, route(problem), message=message)

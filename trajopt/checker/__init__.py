@@ -14,7 +14,8 @@ interval and 1e-6 over the move; times 1e-12.
 """
 
 from trajopt.checker.checking import check, check_file, measure
+from trajopt.checker.command import command_bound
 from trajopt.checker.report import Check, Report
 from trajopt.checker.result_file import CheckerInputError
 
-__all__ = ["Check", "CheckerInputError", "Report", "check", "check_file", "measure"]
+__all__ = ["Check", "CheckerInputError", "Report", "check", "check_file", "command_bound", "measure"]

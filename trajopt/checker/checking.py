@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.checker.case import certificate_checks, time_checks
+from trajopt.checker.command import FORMAT, REST, command_checks, steps_checks
 from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
 from trajopt.checker.reading import Malformed, read
@@ -28,6 +29,8 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
     """
     notes: list[str] = []
     checks = _identity(result, problem)
+    if isinstance(result, Mapping) and result.get("format") == FORMAT:
+        return replace(_report([*checks, *command_checks(result, notes)], False, strict, notes), tolerance=REST)
     try:
         case = read(result, notes)
     except Malformed as fault:
@@ -42,13 +45,16 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
 
 
 def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None = None, strict: bool = False) -> Report:
-    """Check the result file at ``path``, its seal, and a trajectory.csv beside a result.json, which must say the same.
+    """Check the result file at ``path``, its seal, and a trajectory.csv or command.csv beside a result.json, which must
+    say the same.
 
     Raises CheckerInputError when the file cannot be read as JSON data at all.
     """
     result = read_json(Path(path))
     report = check(result, problem, strict=strict)
     report = replace(report, checks=(question("seal", _seal_fault(result)), *report.checks))
+    if result.get("format") == FORMAT:
+        return replace(report, checks=(*report.checks, *steps_checks(Path(path), result)))
     table = Path(path).with_name("trajectory.csv")
     if Path(path).name != "result.json" or not os.path.lexists(table):
         return report

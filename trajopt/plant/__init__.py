@@ -4,27 +4,6 @@ from trajopt.plant.command import Command
 from trajopt.plant.minimum_time import band, time_optimal
 from trajopt.plant.plant import Plant
 from trajopt.plant.simulate import response
-from trajopt.plant.vibration import (
-    mode_derivative_weights,
-    mode_pole,
-    mode_weights,
-    profile_vibration,
-    residual_amplitude,
-    residual_vibration,
-    start_weights,
-)
+from trajopt.plant.vibration import residual_vibration
 
-__all__ = [
-    "Command",
-    "Plant",
-    "band",
-    "mode_derivative_weights",
-    "mode_pole",
-    "mode_weights",
-    "profile_vibration",
-    "residual_amplitude",
-    "residual_vibration",
-    "response",
-    "start_weights",
-    "time_optimal",
-]
+__all__ = ["Command", "Plant", "band", "residual_vibration", "response", "time_optimal"]

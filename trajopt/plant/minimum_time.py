@@ -27,8 +27,10 @@ from trajopt.plant.polish import (
     settle,
     settled_sign,
     sign_margin,
+    without_rounding,
 )
 from trajopt.plant.simulate import end_error
+from trajopt.plant.vibration import mode_pole
 
 _MESHES: Final = (30, 60, 120, 240, 480)
 _REPAIRS: Final = 4
@@ -70,8 +72,8 @@ def time_optimal(
 
     ValueError: one line with a remedy, for input that cannot be met. RuntimeError: no structure was found.
     """
-    u_ss, y_f = _ends(plant, umin, umax, u_ss, y_f)
-    move = _move(plant, umin, umax, u_ss, y_f, _added(plant, robust))
+    u_ss, y_f = ends(plant, umin, umax, u_ss, y_f)
+    move = _move(plant, umin, umax, u_ss, y_f, added_poles(plant, robust))
     best: Candidate | None = None
     start = coarse(move, _MESHES[0], np.empty(0), move.guess())
     for intervals in _MESHES:
@@ -97,7 +99,7 @@ def band(low: float, high: float, damping: float = 0.0, count: int = 3) -> tuple
             f"band: {low:g} to {high:g} rad/s, damping {damping:g}, {count} samples; needs 0 < low <= high, "
             "0 <= damping < 1, at least one sample"
         )
-    return tuple(complex(-damping * w, w * np.sqrt(1 - damping**2)) for w in np.linspace(low, high, count))
+    return tuple(mode_pole(float(w), damping) for w in np.linspace(low, high, count))
 
 
 def _is_better(one: Candidate, other: Candidate) -> bool:
@@ -124,7 +126,7 @@ def _candidates(move: Move, start: Coarse) -> Iterator[Candidate]:
             return
 
 
-def _ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float | None) -> tuple[float, float]:
+def ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float | None) -> tuple[float, float]:
     """The final input and output, each from the other where one is missing; ValueError if they cannot be met."""
     given = [x for x in (umin, umax, u_ss, y_f) if x is not None]
     if not np.all(np.isfinite(given)) or not umin < umax:
@@ -142,9 +144,13 @@ def _ends(plant: Plant, umin: float, umax: float, u_ss: float | None, y_f: float
     assert u_ss is not None
     y_f = u_ss * plant.limit if y_f is None else y_f
     if not plant.rigid and abs(y_f - u_ss * plant.limit) > _MATCH * max(abs(y_f), abs(u_ss * plant.limit)):
-        raise ValueError(f"u_ss: {u_ss:g} holds y = {u_ss * plant.limit:g}, not y_f = {y_f:g}; leave one of them out")
+        held = u_ss * plant.limit
+        raise ValueError(f"u_ss: {u_ss:g} holds y = {held:g}, not y_f = {y_f:g}; correct it or leave it out")
     if not umin <= u_ss <= umax:
-        raise ValueError(f"u_ss: {u_ss:g} is outside the input limits {umin:g} to {umax:g}; widen them or move less")
+        raise ValueError(
+            f"u_ss: {u_ss:g}, which holds y_f = {y_f:g}, is outside the input limits {umin:g} to {umax:g}; "
+            "widen them or move less"
+        )
     if not (y_f if plant.rigid else u_ss):
         raise ValueError("y_f: a move of zero length needs no command; give a final value other than zero")
     _check_reach(plant, umin, umax, u_ss, y_f)
@@ -178,8 +184,8 @@ def _check_periods(move: Move, duration: float) -> None:
             )
 
 
-def _added(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex, ...]:
-    """The poles of ``robust`` with their conjugates."""
+def added_poles(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex, ...]:
+    """The poles of ``robust`` (see `time_optimal`) with their conjugates; ValueError if there are none to add."""
     if isinstance(robust, str):
         if robust != "zvd":
             raise ValueError(f'robust: "{robust}"; give "zvd" or a list of poles')
@@ -189,8 +195,8 @@ def _added(plant: Plant, robust: str | Sequence[complex]) -> tuple[complex, ...]
         return added
     upper = [complex(p) for p in robust]
     conjugates = [p.conjugate() for p in upper if p.imag and upper.count(p.conjugate()) < upper.count(p)]
-    if not np.all(np.isfinite(upper)) or 0 in upper:
-        raise ValueError("robust: poles must be finite and not zero")
+    if not np.all(np.isfinite(upper)) or 0 in upper or any(p.real > 0 for p in upper):
+        raise ValueError("robust: poles must be finite, not zero and not unstable (real part above zero)")
     return settled([*upper, *conjugates], GIVEN)
 
 
@@ -201,7 +207,7 @@ def _move(plant: Plant, umin: float, umax: float, u_ss: float, y_f: float, added
 
 
 def _command(plant: Plant, move: Move, best: Candidate, umin: float, umax: float, u_ss: float, y_f: float) -> Command:
-    structure, duration = best.structure, best.duration
+    structure, duration = without_rounding(best.structure), best.duration
     switches = tuple(float(x) for x in duration - structure.h[1:] * best.horizon)
     up = structure.sign * (-1.0) ** np.arange(len(structure.h)) > 0
     levels = tuple(umax if x else umin for x in up)

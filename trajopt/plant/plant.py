@@ -53,7 +53,7 @@ class Plant:
         """G(s) = gain prod (s - z)/prod (s - p); complex poles and zeros in conjugate pairs."""
         finite = np.all(np.isfinite([*poles, *zeros, gain]))
         if not finite or not gain:
-            raise ValueError(f"plant: gain {gain:g}; it must be finite and not zero, poles and zeros finite")
+            raise ValueError(f"gain: {gain:g}; it must be finite and not zero, poles and zeros finite")
         _check_order(len(zeros), len(poles))
         known = repeated(settled([complex(p) for p in poles], GIVEN), GIVEN)
         roots = tuple(complex(z) for z in zeros)

@@ -17,6 +17,7 @@ from trajopt.plant.sigma import lowest, roots, samples, share
 _STEPS: Final = 60
 _DROPS: Final = 8  # arcs that may vanish one after the other
 _EXACT: Final = 1e-12  # of the equations, relative to their terms
+_NO_ARC: Final = 1e-13  # of the duration
 _SIGN: Final = 1e-9  # how far sigma may go astray, relative to the sum of its terms
 
 
@@ -178,6 +179,21 @@ def without_shortest(structure: Structure, reached: Structure) -> Structure:
     if arc == 0:
         return Structure(-structure.sign, np.delete(structure.h, 1))
     return Structure(structure.sign, np.delete(structure.h, [arc, arc + 1][: len(structure.h) - arc]))
+
+
+def without_rounding(structure: Structure) -> Structure:
+    """The structure without arcs so short that they are rounding: where sigma touches zero two switches meet."""
+    h, sign = structure.h, structure.sign
+    while len(h) > 1:
+        gaps = -np.diff(np.append(h, 0.0))
+        arc = int(np.argmin(gaps))
+        if gaps[arc] > _NO_ARC * h[0]:
+            break
+        if arc == 0:
+            h, sign = np.delete(h, 1), -sign
+        else:
+            h = np.delete(h, [arc, arc + 1][: len(h) - arc])
+    return Structure(sign, h)
 
 
 def split(structure: Structure, n: int) -> Iterator[Structure]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import expm
 
+from trajopt.checker.linear_system import System
 from trajopt.plant.command import Command
 from trajopt.plant.exponentials import Floats
 from trajopt.plant.plant import Plant, StateSpace
@@ -20,9 +21,10 @@ def response(plant: Plant, command: Command, times: Floats) -> Floats:
         raise ValueError(f"times: {t.shape}; give a row of times from 0 on")
     states = pieces(plant.matrices, starts, levels[:-1])
     piece = np.searchsorted(starts, t, side="right") - 1
-    _, _, c, d = plant.matrices
-    ends = [_advance(plant.matrices, states[i], levels[i], x - starts[i]) for i, x in zip(piece, t, strict=True)]
-    result: Floats = np.array(ends).reshape(len(t), len(c)) @ c + d * levels[piece]
+    system = System(*plant.matrices)
+    exponentials, integrals = system.reached(t - starts[piece])
+    later = (exponentials @ states[piece, :, None])[:, :, 0] + integrals * levels[piece, None]
+    result: Floats = later @ system.c + system.d * levels[piece]
     return result
 
 
