@@ -23,8 +23,8 @@ from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
 from trajopt.switching_times import as_chain, fastest
 from trajopt.ties import break_tie, tied_route
-from trajopt.time_search import minimum_time
 from trajopt.tighten import tighten
+from trajopt.time_search import minimum_time
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, drawn_in, prescribed, without
 from trajopt.verdict import Verdict

@@ -1,9 +1,9 @@
 """Tightening the bound on power and energy, on request.
 
 Where the relaxation of `trajopt.power` is loose, the lifted squares lie above the squares at a few nodes only: next to
-where the move leaves the reach that its chord was drawn for. There, the largest and the least speed are asked for of any move in
-the relaxation that costs no more than the answer. No better move is faster or slower, so the chord may be drawn between
-them; the bounds on the speed are those recomputed from the duals. Then the program is relaxed again, and so on.
+where the move leaves the reach that its chord was drawn for. There, the largest and the least speed are asked for of
+any move in the relaxation that costs no more than the answer. No better move is faster or slower, so the chord may be
+drawn between them; the bounds on the speed are those recomputed from the duals. Then the program is relaxed again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MARGIN: Final = 1e-9  # relative: by how much the answer's cost may be exceeded
 
 
 def tighten(setting: Setting, relaxed: Attempt, value: float, clock: Clock) -> Attempt:
-    """The relaxation with its bound brought closer to an answer of cost ``value``; as it is, where nothing is gained."""
+    """The relaxation with its bound brought closer to an answer of cost ``value``; as it is where nothing is gained."""
     setting = without(setting, ["brake_energy"])
     reach: Reach | None = None
     best = relaxed
