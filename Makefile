@@ -1,4 +1,4 @@
-.PHONY: help setup demo test lint soak lock clean
+.PHONY: help setup demo test lint soak bench lock clean
 
 export LC_ALL := C.UTF-8
 export TZ := UTC
@@ -13,6 +13,7 @@ help:
 	@echo 'make test    set up if needed, then run the tests, ruff and mypy'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make soak    the long random test'
+	@echo 'make bench   times against peers, in one run'
 	@echo 'make lock    renew requirements.lock from pyproject.toml (LOCKFLAGS=--upgrade takes newer releases)'
 	@echo 'make clean   remove what these made, .venv included'
 	@echo 'PYTHON=...   the interpreter to build .venv with (3.11 or later)'
@@ -29,7 +30,10 @@ test: setup
 
 lint: setup
 	$(python) -m ruff check
-	$(python) -m mypy trajopt norms scara problems
+	$(python) -m mypy trajopt norms scara problems bench
+
+bench: setup
+	$(python) -m bench.least_time --output build/bench
 
 soak: setup
 	$(python) -m tests.soak

@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
@@ -25,12 +25,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from tests import test_plant_random
+from tests import test_plant_random, test_switching
 from tests.campaign import Record, draw, judge, remarks, shrunk
 
 STORE: Final = Path(__file__).parents[1] / ".soak"
 SPECS: Final = 20_000
 PLANTS: Final = 300
+CHAINS: Final = 200_000
+_BATCH: Final = 500  # chains a task
 MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
 PATIENCE: Final = 600.0  # s without any answer: the workers hang
 _RECYCLE: Final = 400  # specs a worker judges: solvers leak
@@ -48,15 +50,17 @@ def main(arguments: list[str] | None = None) -> int:
         records = list(_watched(_run(seeds, options.workers, since + options.seconds), len(seeds), console))
     summary = summarise(records, time.monotonic() - since)
     if not options.show and not options.seeds:
-        summary["plants"] = {"count": options.plants, "faults": _plants(options.plants, options.workers)}
+        summary["plants"] = _stage(test_plant_random.fault, options.plants, options.workers)
+        batches = -(-options.chains // _BATCH)
+        summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
     _print(summary, console)
     if not options.show:
         STORE.mkdir(exist_ok=True)
         path = STORE / f"seed{options.seed}_{len(records)}.json"
         path.write_text(json.dumps(summary, indent=1))
         console.print(f"written: {path}")
-    faults = summary.get("plants", {}).get("faults")
-    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or bool(faults))
+    faults = any(summary.get(stage, {}).get("faults") for stage in ("plants", "chains"))
+    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or faults)
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
@@ -68,6 +72,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
     parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
+    parser.add_argument("--chains", type=int, default=CHAINS, help="how many least times against Ruckig's (200000)")
     parser.add_argument("--seeds", type=int, nargs="+", help="only the specs of these seeds")
     parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
     parser.add_argument(
@@ -76,12 +81,12 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _plants(count: int, workers: int) -> dict[int, str]:
-    """What is wrong with the solutions of random plants, by seed."""
+def _stage(fault: Callable[[int], str], count: int, workers: int) -> dict[str, Any]:
+    """How many seeds were tried of a stage beside the campaign, and what is wrong with them, by seed."""
     pool = _pool(workers)
     try:
-        found = {seed: pool.submit(test_plant_random.fault, seed) for seed in range(count)}
-        return {seed: fault for seed, future in found.items() if (fault := _outcome(future))}
+        found = {seed: pool.submit(fault, seed) for seed in range(count)}
+        return {"count": count, "faults": {seed: text for seed, future in found.items() if (text := _outcome(future))}}
     finally:
         _end(pool)
 
@@ -224,11 +229,13 @@ def _print(summary: dict[str, Any], console: Console) -> None:
     for failure in summary["failures"]:
         for why in failure["why"]:
             console.print(f"seed {failure['seed']} {failure['status']}: {why}", highlight=False, markup=False)
-    if "plants" in summary:
-        plants = summary["plants"]
-        console.print(f"{plants['count']} linear plants, {len(plants['faults'])} not solved and proven")
-        for seed, fault in plants["faults"].items():
-            console.print(f"plant {seed}: {fault}", highlight=False, markup=False)
+    stages = {"plants": "linear plants, not solved and proven", "chains": "least times, unlike Ruckig's"}
+    for stage, words in stages.items():
+        if stage in summary:
+            faults = summary[stage]["faults"]
+            console.print(f"{summary[stage]['count']} {words}: {len(faults)}")
+            for seed, fault in faults.items():
+                console.print(f"{stage} {seed}: {fault}", highlight=False, markup=False)
 
 
 if __name__ == "__main__":

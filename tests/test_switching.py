@@ -74,13 +74,26 @@ def by_ruckig(chain: Chain) -> float:
     return float(trajectory.duration)
 
 
+def fault(seed: int, count: int = 500) -> str:
+    """What is wrong with the least times of random moves against Ruckig's; empty if nothing. The soak calls it."""
+    rng, compared = np.random.default_rng(seed), 0
+    while compared < count:
+        chain = random_chain(rng)
+        if chain is None:
+            continue
+        try:
+            found, wanted = verified(chain).duration, by_ruckig(chain)
+        except Exception as error:
+            return f"{chain}: {error!r}"
+        if abs(found - wanted) > 1e-9 * wanted:
+            return f"{chain}: {found!r}, Ruckig {wanted!r}"
+        compared += 1
+    return ""
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_ruckig_agrees_on_random_moves(seed: int) -> None:
-    rng, compared = np.random.default_rng(seed), 0
-    while compared < 500:
-        if (chain := random_chain(rng)) is not None:
-            assert verified(chain).duration == pytest.approx(by_ruckig(chain), rel=1e-9), chain
-            compared += 1
+    assert fault(seed) == ""
 
 
 def test_ruckig_agrees_on_degenerate_moves() -> None:

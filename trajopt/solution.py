@@ -122,6 +122,12 @@ class Solution:
 
         return plot_vibration(self, frequency, damping)
 
+    def plot_arcs(self) -> list[Axes]:
+        """When a minimum-time move runs on which limit (see `trajopt.plot_arcs`). Raises NoSolution."""
+        from trajopt.plot_arcs import plot_arcs
+
+        return plot_arcs(self)
+
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data, numbers null where there is no solution."""
         problem = self.problem.canonical()
@@ -150,8 +156,8 @@ class Solution:
         return seal(self.to_dict() | extra)
 
     def save(self, directory: str | Path) -> list[Path]:
-        """Write result.json, trajectory.csv, trajectory.png, prices.png and, where vibration is limited, vibration.png
-        into ``directory``; returns the paths.
+        """Write result.json, trajectory.csv, trajectory.png, prices.png and, where there is something to show, arcs.png
+        and vibration.png into ``directory``; returns the paths.
 
         Without a solution only result.json is written. Raises OSError.
         """
@@ -163,6 +169,7 @@ class Solution:
             "trajectory.png": lambda: self.plot()[0],
             "prices.png": self.plot_prices,
             "vibration.png": self.plot_vibration,
+            "arcs.png": lambda: self.plot_arcs()[0],
         }
         written = [directory / "result.json"]
         for stale in ("trajectory.csv", *pictures):  # of another answer
@@ -174,6 +181,8 @@ class Solution:
         write_csv(self, written[-1])
         if not self.problem.vibration:
             del pictures["vibration.png"]
+        if self.route.model != "arcs":
+            del pictures["arcs.png"]
         for name, draw in pictures.items():
             figure: Any = draw().figure
             figure.savefig(directory / name, dpi=150)

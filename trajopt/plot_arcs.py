@@ -1,0 +1,78 @@
+"""The arcs of a minimum-time move: when it runs on which limit, and chattering over the logarithm of time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from trajopt import units
+from trajopt.errors import NoSolution
+from trajopt.plot import COLOURS, GREY, Panels
+from trajopt.problem import DERIVATIVES
+
+if TYPE_CHECKING:
+    from trajopt.solution import Solution
+
+SIDES: Final = {"max": COLOURS[0], "min": COLOURS[1]}
+
+
+def plot_arcs(solution: Solution) -> Panels:
+    """A bar for every arc, in the row of the quantity whose limit it runs on, with touches as rings; below, where the
+    move chatters into a cruise, the top derivative over the time left until the cruise, logarithmic.
+
+    Raises NoSolution where there are no arcs of switching times.
+    """
+    arcs = [arc for arc in solution.structure.get("arcs", ()) if "limit" in arc]
+    if not arcs:
+        raise NoSolution("the solution has no arcs: it was not found by its switching times")
+    chatters = bool(solution.structure.get("chatters"))
+    figure = Figure(figsize=(7.0, 5.2 if chatters else 2.8), layout="constrained", facecolor="white")
+    panels = Panels(figure.subplots(2 if chatters else 1, 1, squeeze=False)[:, 0])
+    _timeline(panels[0], arcs, solution.structure.get("touches", ()))
+    panels[0].set_title(solution.problem.title or "Arcs", loc="left", fontweight="bold", fontsize=11)
+    if chatters:
+        top = DERIVATIVES[solution.problem.order]
+        unit = units.kinds(solution.problem.rotary)[top].unit
+        _towards_the_cruise(panels[1], arcs, f"{top} [{unit}]")
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    for axes in panels:
+        axes.tick_params(labelsize=8, color=GREY)
+        axes.spines[["top", "right"]].set_visible(False)
+    return panels
+
+
+def _timeline(axes: Axes, arcs: list[dict[str, Any]], touches: Any) -> None:
+    shown = [name for name in DERIVATIVES if any(arc["limit"].startswith(f"{name}.") for arc in arcs)]
+    rows = {name: k for k, name in enumerate(reversed(shown))}
+    for arc in arcs:
+        name, _, side = arc["limit"].partition(".")
+        axes.barh(rows[name], arc["to"] - arc["from"], left=arc["from"], height=0.7, color=SIDES[side], linewidth=0)
+    for touch in touches:
+        name = touch["limit"].partition(".")[0]
+        if name in rows:
+            axes.plot(touch["time"], rows[name], "o", color="black", markerfacecolor="white", markersize=4)
+    for side, colour in SIDES.items():
+        axes.barh(0, 0.0, color=colour, label=f"on the {side}imum")
+    axes.set_yticks(list(rows.values()), list(rows))
+    axes.set_xlabel("time [s]", fontsize=8)
+    axes.set_xlim(0.0, arcs[-1]["to"])
+
+
+def _towards_the_cruise(axes: Axes, arcs: list[dict[str, Any]], label: str) -> None:
+    """The top derivative of the arcs before the longest one, the cruise: each touch is the last one drawn smaller."""
+    cruise = max(range(len(arcs)), key=lambda k: arcs[k]["to"] - arcs[k]["from"])
+    end, before = arcs[cruise]["from"], arcs[:cruise]
+    left = np.array([end - arc["from"] for arc in before] + [end - before[-1]["to"]])
+    left[-1] = max(left[-1], 0.3 * left[-2])
+    top = np.array([arc["top"] for arc in before])
+    axes.stairs(top[::-1], left[::-1], color=COLOURS[0], linewidth=1.4, baseline=None)
+    axes.set_xscale("log")
+    axes.invert_xaxis()
+    axes.set_xlabel("time left until the cruise [s], logarithmic", fontsize=8)
+    axes.set_ylabel(label, fontsize=8)
+    axes.grid(color="0.92", linewidth=0.7)
+    axes.set_axisbelow(True)
