@@ -13,7 +13,7 @@ from tests.conftest import axis, solved, term
 from trajopt.model_cvxpy import ConvexModel
 from trajopt.motor import Intake, implied, power
 
-MOTOR = {  # shared/reference/power_energy.md, "Servomotor"
+MOTOR = {  # like an HF-MP43K; the paper prints none
     "inertia": 4.142e-4,
     "viscous": 2e-4,
     "coulomb": 0.02,

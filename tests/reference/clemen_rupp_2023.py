@@ -1,6 +1,6 @@
 """Published numbers of Clemen & Rupp 2023 (Tables II and III, section IV-F) and independent recomputations of them.
 
-The recomputed absolute values come from ../shared/reference/power_energy.md; ratios refer to the smallest energy and
+The absolute values were recomputed independently; ratios refer to the smallest energy and
 the smallest peak power of the whole study (Euler scheme, N = 200, plain sums as norms).
 """
 

@@ -1,4 +1,4 @@
-"""Optima that are known in closed form; see ../shared/reference/closed_forms.md. Rest to rest unless stated; SI."""
+"""Optima that are known in closed form. Rest to rest unless stated; SI."""
 
 from __future__ import annotations
 

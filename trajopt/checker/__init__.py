@@ -4,7 +4,7 @@ It imports nothing else of trajopt: a slip there must not be repeated here. Its 
 it, in SI units. Between nodes every signal of the ``exact`` scheme is a polynomial, so limits are checked at every
 instant, by bounds on Bernstein coefficients and halving. Two twins do the same sums: one in floats, vectorised, and
 one in rational numbers. The float twin goes first; whatever lies within ten times of its tolerance, or where rounding
-could matter, the rational twin decides. (shared/reference/reliability.md, "The checker".)
+could matter, the rational twin decides.
 
 Imports go one way: report, case, reading and polynomials, the two twins, questions, checking; result_file beside.
 
