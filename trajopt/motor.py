@@ -5,7 +5,8 @@ current u = F/Kt; voltage R u + Kt v; the power drawn from the drive's bus
     P = F v + R u² + Ks |u| + Ke v² u² + Kh |v| |u|^γ
 
 with copper, switching, eddy-current and hysteresis losses (the loss function of Wang, Ueda & Bortoff). What a braking
-motor feeds back is lost but for a share, the recovery η: the electrical energy of a move is ∫ max(0, P) - η max(0, -P) dt.
+motor feeds back is lost but for a share, the recovery η: the electrical energy of a move is
+∫ max(0, P) - η max(0, -P) dt.
 """
 
 from __future__ import annotations
