@@ -71,3 +71,25 @@ def test_reversing_moves_say_that_no_bound_is_known() -> None:
         table_i("power", "linf", limits={"velocity": 0.5, "acceleration": 4.905, "jerk": 98.1}, intervals=40)
     )
     assert solution.certificate["lower_bound"] is None and "no bound known" in solution.certificate["bounds"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("norm", ["l2", "linf"])
+def test_tightening_closes_the_gap(norm: str) -> None:
+    problem = table_i("power", norm)
+    loose = solved(problem)
+    transcription = problem.transcription.model_copy(update={"tighten": True})
+    tight = solved(problem.replace(transcription=transcription))
+    assert tight.objective == pytest.approx(loose.objective, rel=1e-9)
+    assert loose.certificate["gap"] > 1e-5 > 1e-6 >= tight.certificate["gap"]
+    assert loose.certificate["lower_bound"] < tight.certificate["lower_bound"] <= tight.objective * (1 + 1e-9)
+    assert tight.status is trajopt.Verdict.SOLVED
+
+
+def test_a_power_limit_that_cannot_be_kept_is_explained_with_a_cure_that_works() -> None:
+    tight = table_i("jerk", "l2", limits={"velocity": (0.0, 0.5), "jerk": 98.1, "power": 1.0}, intervals=40)
+    solution = trajopt.solve(tight)
+    assert solution.status is trajopt.Verdict.IMPOSSIBLE_ON_GRID
+    enough = solution.explanation["limits"]["power"]["value"]
+    assert solved(tight.with_limit("power", enough)).metrics["peak_power"] <= enough * (1 + 1e-9)
+    assert not trajopt.solve(tight.with_limit("power", enough * 0.999)).status.solved

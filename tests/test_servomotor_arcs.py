@@ -13,10 +13,8 @@ from trajopt.velocity_domain import (
     Limits,
     Servomotor,
     ServoOptimum,
-    best_trapezoid,
     conditions,
     optimum,
-    trapezoid_energy,
 )
 
 MOTOR = Servomotor(0.57, 3.0, 4.142e-4, 2e-4, 0.02, 4.0)
@@ -171,17 +169,6 @@ def test_no_move_towards_another_profile_is_cheaper(name: str) -> None:
     assert compared >= 40
 
 
-def test_saving_against_trapezoids() -> None:
-    for name, saving in (("case 1", 0.175), ("case 3", 0.151)):
-        motor, distance, duration, limits, _ = MOVES[name]
-        best = best_trapezoid(motor, distance, duration, limits)
-        assert best.feasible
-        assert 1 - move(name).energy / best.energy == pytest.approx(saving, abs=5e-4)
-        third = trapezoid_energy(motor, distance, duration, duration / 3, limits)
-        assert third.energy >= best.energy
-        assert third.feasible == (name == "case 1")  # case 3 would need 180 rad/s
-
-
 def test_a_long_move_lingers_at_the_speed_at_which_friction_makes_it_cheapest_to_go_on() -> None:
     found = move("linger")
     middle = found.at(np.linspace(1.0, 3.0, 50)).velocity
@@ -233,7 +220,3 @@ def test_moves_and_limits_that_make_no_sense() -> None:
         Limits(velocity=0.0)
     with pytest.raises(ValueError, match="objective"):
         optimum(MOTOR, 5.0, 0.4, objective="heat")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="no symmetric trapezoid"):
-        best_trapezoid(MOTOR, 60.0, 0.42, CASE_3[2])
-    with pytest.raises(ValueError, match="ramp"):
-        trapezoid_energy(MOTOR, 5.0, 0.4, 0.3)

@@ -39,6 +39,7 @@ def solve(
         Path | None, typer.Option("-o", "--output", help="write CSV, JSON and PNG into this folder")
     ] = None,
     seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit, s")] = None,
+    tighten: Annotated[bool, typer.Option("--tighten", help="tighten the bound on power and energy")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem; exits 0 only with a checked answer."""
@@ -46,7 +47,7 @@ def solve(
     from trajopt.worker import solve_apart
 
     _refuse_seconds(seconds)
-    problem = problem_file.load(source, overrides)
+    problem = problem_file.load(source, [*overrides, *(["transcription.tighten=true"] if tighten else [])])
     _make_folder(output)
     for warning in preflight.warnings(problem):
         print(f"warning: {warning}", file=sys.stderr)

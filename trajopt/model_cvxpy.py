@@ -135,6 +135,10 @@ class ConvexModel:
 
     def _prices(self) -> dict[str, Prices]:
         """The prices of named rows; empty where the solver gave no duals."""
+        with np.errstate(over="ignore"):  # of a limit absurdly small against the move
+            return self._read_prices()
+
+    def _read_prices(self) -> dict[str, Prices]:
         return {
             name: Prices(
                 np.concatenate([at for _, _, at, _ in rows]),

@@ -74,6 +74,7 @@ def plot(solution: Solution) -> Panels:
             _shade(axes, time, close, shortest=(0.99 if top else 1.5) * float(np.min(np.diff(trajectory.time))))
         axes.plot(time, values, color=COLOURS[0], linewidth=1.6, label=name)
         _finish(axes, name, [trajectory])
+    _mark_arcs(panels, solution.structure)
     _title(panels, solution.problem.title or "Trajectory", pad=18)
     _note(panels[0], f"minimised {_pretty(objective_text(solution))}", "left", 8)
     return panels
@@ -312,6 +313,23 @@ def _shade(axes: Axes, time: Floats, marked: NDArray[np.bool_], shortest: float)
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         if time[end - 1] - time[first] >= shortest:
             axes.axvspan(time[first], time[end - 1], facecolor=SHADE, alpha=0.35, linewidth=0, zorder=0.5)
+
+
+def _mark_arcs(panels: Panels, structure: Mapping[str, Any]) -> None:
+    """Thin lines at the switch times of a motor's arcs, with their names in the panel of the current."""
+    arcs = [arc for arc in structure.get("arcs", ()) if "name" in arc]
+    if not arcs:
+        return
+    total = arcs[-1]["to"]
+    named = next((axes for axes in panels if axes.get_ylabel().startswith("current")), panels[-1])
+    for axes in panels:
+        for arc in arcs[:-1]:
+            axes.axvline(arc["to"], color=GREY, linewidth=0.6, linestyle=(0, (1, 2)), zorder=1.2)
+    for arc in arcs:
+        if arc["to"] - arc["from"] > 0.02 * total:
+            middle = (arc["from"] + arc["to"]) / 2
+            named.annotate(arc["name"], (middle, 1.0), (0, 2), xycoords=("data", "axes fraction"),
+                           textcoords="offset points", ha="center", va="bottom", fontsize=7, color=GREY)  # fmt: skip
 
 
 def _mark_via(axes: Axes, name: str, trajectory: Trajectory) -> None:

@@ -125,7 +125,13 @@ def _iron_at(model: Any, load: Load, way: int, pair: Any, at: Any) -> Any:
 
 @dataclass(frozen=True)
 class Lifted(Quantities):
-    """Quantities whose power is relaxed (see the module). Its variables join the model when power is first asked."""
+    """Quantities whose power is relaxed (see the module). Its variables join the model when power is first asked.
+
+    ``reach``: (lower, upper) bounds on the speeds that are squared, where better ones than those of the limits are
+    known: the chord then runs between the squares of both.
+    """
+
+    reach: tuple[Floats, Floats] | None = None
 
     def _power(self) -> Signal:
         kept = getattr(self.model, "lifted_power", None)
@@ -150,7 +156,8 @@ class Lifted(Quantities):
         velocity = self.signal("velocity").nodes
         ends = {(node, i): x for node, i, x in prescribed(self.problem, self.mesh)}
         assert isinstance(mass, float)
-        squares = self._squares(way * velocity, _node_reach(self, step), (ends[0, 1], ends[last, 1]))
+        squares = self._squares(way * velocity, _node_reach(self, step), (ends[0, 1], ends[last, 1]), self.reach)
+        model.lifted_squares = (way * velocity, squares)
         power = model.times(mass / step, squares[1:] - squares[:-1])
         if load.viscous:
             power = power + model.times(load.viscous, squares[1:] + squares[:-1])
@@ -166,7 +173,8 @@ class Lifted(Quantities):
         ends = {(node, i): x for node, i, x in prescribed(self.problem, self.mesh)}
         assert isinstance(mass, float)
         speeds = (ends[0, 1] + ends[0, 2] * step / 2, ends[last, 1] - ends[last, 2] * step / 2)
-        squares = self._squares(way * velocity.pieces[1], _reach(self, step), speeds)
+        squares = self._squares(way * velocity.pieces[1], _reach(self, step), speeds, self.reach)
+        model.lifted_squares = (way * velocity.pieces[1], squares)
         first, final = (np.array([mass * ends[k, 1] * ends[k, 2]]) for k in (0, last))
         power = model.concatenate([first, model.times(mass / step, squares[1:] - squares[:-1]), final])
         if load.viscous:
@@ -176,9 +184,14 @@ class Lifted(Quantities):
             power = power + model.times(way * load.coulomb, velocity.nodes)
         return Signal(power, ())
 
-    def _squares(self, speed: Any, top: Floats, ends: tuple[float, float]) -> Any:
+    def _squares(
+        self, speed: Any, top: Floats, ends: tuple[float, float], reach: tuple[Floats, Floats] | None = None
+    ) -> Any:
         """What stands for speed²/2: its value at the ends; between them variables from speed²/2 to the chord
-        top·speed/2, each scaled by its own top."""
+        top·speed/2, or that between the bounds of ``reach``, each scaled by its own top."""
+        low = np.zeros(len(top))
+        if reach is not None:
+            low, top = np.maximum(reach[0], 0.0), np.minimum(top, reach[1])
         model, known = self.model, np.flatnonzero(np.isfinite(top[1:-1]))
         top = np.where(np.isfinite(top), top, self.sizes.derivative[1])[1:-1]
         share = model.times(1 / top, speed[1:-1])
@@ -186,7 +199,8 @@ class Lifted(Quantities):
         q = model.vector(len(top), 1.0, -free, free)
         model.nonpositive(model.squares(share) - q)
         if len(known):
-            model.nonpositive(q[known] - share[known])
+            least = (low[1:-1] / top)[known]
+            model.nonpositive(q[known] - model.times(1 + least, share[known]) + least)
         inner = model.times(top**2 / 2, q)
         return model.concatenate([np.array([ends[0] ** 2 / 2]), inner, np.array([ends[1] ** 2 / 2])])
 

@@ -335,7 +335,8 @@ class Transcription(Section):
     """How the problem is to be discretised and by whom solved.
 
     ``min_dwell`` (s) and ``touches`` cut off the chattering of a snap-limited minimum time: the least time between two
-    switches, or how often the velocity limit is touched at each end.
+    switches, or how often the velocity limit is touched at each end. ``tighten``: spend more on the bound of power and
+    energy (see `trajopt.tighten`).
     """
 
     intervals: Annotated[int, BeforeValidator(_intervals)] = 200
@@ -343,6 +344,7 @@ class Transcription(Section):
     solver: Literal["auto", "clarabel", "osqp", "ipopt"] = "auto"
     min_dwell: Annotated[float, nonnegative("time")] = 0.0
     touches: Annotated[int | None, BeforeValidator(_touches)] = None
+    tighten: Annotated[bool, Field(strict=True)] = False
 
 
 def _printable(text: str) -> str:

@@ -48,6 +48,9 @@ def print_solution(solution: Solution | PlantSolution) -> None:
     console.print(f"minimised {objective_text(solution)}, in {solution.duration:.9g} s")
     console.print(_table(solution))
     console.print(certificate_text(solution))
+    if (optimum := solution.certificate.get("continuous_optimum")) is not None:
+        above = 100 * solution.certificate["above_continuous"]
+        console.print(f"in continuous time the optimum is {optimum:.9g}; this move is {above:.2g} % above it")
     for row in solution.prices[:3]:
         console.print(f"  {sentence(row, solution.problem.shown(row['name']), objective_label(solution))}")
     for line in _structure_text(solution.structure):
@@ -69,9 +72,10 @@ def _structure_text(structure: Mapping[str, Any]) -> list[str]:
     """The arcs of a minimum time, and what the ordinary S-curve would lose."""
     if "arcs" not in structure:
         return []
-    arcs = [f"{arc['limit']} {arc['to'] - arc['from']:.4g} s" for arc in structure["arcs"]]
+    arcs = [f"{arc.get('limit') or arc['name']} {arc['to'] - arc['from']:.4g} s" for arc in structure["arcs"]]
     shown = arcs if len(arcs) <= 9 else [*arcs[:4], f"… {len(arcs) - 8} more …", *arcs[-4:]]
-    lines = ["arcs: " + ", ".join(shown)]
+    of = f" of {structure['of']}" if "of" in structure else ""
+    lines = [f"arcs{of}: " + ", ".join(shown)]
     if structure.get("chatters"):
         lines.append("the optimum switches without end towards the velocity limit; cut off where nothing is lost")
     if "s_curve" in structure:

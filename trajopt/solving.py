@@ -11,6 +11,7 @@ import numpy as np
 import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
 from trajopt.conclude import conclude, first_solved
+from trajopt.continuous import findings
 from trajopt.explain import explain_power
 from trajopt.model import Claim, Outcome
 from trajopt.power import descend, linearised, relax
@@ -22,6 +23,7 @@ from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
 from trajopt.switching_times import as_chain, fastest
 from trajopt.ties import break_tie, tied_route
+from trajopt.tighten import tighten
 from trajopt.time_search import minimum_time
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, drawn_in, prescribed, without
@@ -34,6 +36,18 @@ _LATER = 1e-7  # of a least time
 def solve(problem: Problem, seconds: float | None = None) -> Solution:
     """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only."""
     clock = Clock(seconds)
+    solution = _solve(problem, clock)
+    if solution.trajectory is None:
+        return solution
+    since = perf_counter()
+    certificate, structure = findings(problem, solution.trajectory, solution.metrics)
+    clock.charge("continuous time", since)
+    found = {**solution.certificate, **certificate}
+    return replace(solution, certificate=found, structure={**structure, **solution.structure}, timings=clock.timings())
+
+
+def _solve(problem: Problem, clock: Clock) -> Solution:
+    """The checked answer, or the verdict."""
     chosen = route(problem)
     setting = Setting.of(problem)
     if (still := _coasting(setting)) is not None:
@@ -169,6 +183,8 @@ def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> t
     else:
         at_answer = linearised(lean, answer.trajectory)
         notes = answer.notes | {"starts": 1, "agreed": 1}
+        if setting.problem.transcription.tighten:
+            relaxed = tighten(lean, relaxed, answer.value, clock)
         answer = replace(_priced(at_answer, replace(answer, notes=notes), clock), bound=relaxed.bound)
         candidates.append(break_tie(at_answer, answer, chosen, clock))
     return first_solved(setting, [*candidates, (answer, chosen)], clock, local=True), answer

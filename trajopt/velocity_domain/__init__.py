@@ -1,7 +1,7 @@
 """Global optima with speed as the independent variable: certificates and oracles, on plain floats.
 
-Servomotor energy without a jerk limit (``optimum``, ``conditions``, ``best_trapezoid``), and mechanical power and
-energy of a mass under a jerk limit (``least_peak_power`` and its neighbours).
+Servomotor energy without a jerk limit (``optimum``, ``conditions``), and mechanical power and energy of a mass under a
+jerk limit (``least_peak_power`` and its neighbours).
 """
 
 from trajopt.velocity_domain.axis import Axis
@@ -18,7 +18,6 @@ from trajopt.velocity_domain.power import (
 from trajopt.velocity_domain.search import optimum
 from trajopt.velocity_domain.servo import Arc, ServoOptimum, State
 from trajopt.velocity_domain.square import SquareOptimum, least_square_power
-from trajopt.velocity_domain.trapezoid import Trapezoid, best_trapezoid, trapezoid_energy
 
 __all__ = [
     "Arc",
@@ -30,8 +29,6 @@ __all__ = [
     "Servomotor",
     "SquareOptimum",
     "State",
-    "Trapezoid",
-    "best_trapezoid",
     "conditions",
     "least_energy",
     "least_peak_power",
@@ -39,5 +36,4 @@ __all__ = [
     "minimum_time",
     "optimum",
     "power_within",
-    "trapezoid_energy",
 ]

@@ -1,0 +1,183 @@
+"""What the optimum is in continuous time, where the velocity domain knows it, and the arcs of a motor's move.
+
+With speed as the independent variable (`trajopt.velocity_domain`) two kinds of one-way moves from rest to rest have
+optima that no mesh limits: a servomotor without a jerk limit, and a mass under one. A solution of such a problem says
+by how much its mesh misses them, and names the arcs of the motor's optimum (Wang, Ueda & Bortoff) with switch times and
+the necessary conditions. Other moves of a motor have their arcs read off the trajectory, to an interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from itertools import groupby
+from math import inf, isfinite, sqrt
+from typing import Any, Final
+
+import numpy as np
+
+from trajopt import velocity_domain as vd
+from trajopt.errors import InternalError
+from trajopt.problem import Problem
+from trajopt.trajectory import Trajectory
+
+_BELOW: Final = 1e-6  # relative: an answer this far below the optimum contradicts it
+_ZERO: Final = 1e-3  # of the peak current: below it the control counts as zero
+_AT: Final = 1e-6  # relative: this close to a limit is on it
+_PROVEN: Final = ("energy", "power linf", "electrical_energy", "copper_loss")
+
+
+def findings(
+    problem: Problem, trajectory: Trajectory, metrics: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What joins the certificate and the structure of a solved problem: both empty where nothing is known.
+
+    Raises InternalError when an answer is better than the optimum in continuous time.
+    """
+    if len(problem.objective.terms) != 1 or not _one_way_rest_to_rest(problem):
+        return {}, _on_mesh(trajectory)
+    try:
+        if _motor_alone(problem):
+            optimum = _servo(problem)
+            structure = _structure(optimum)
+            return _certificate(problem, optimum.energy, metrics), structure
+        if _mass_alone(problem, metrics):
+            return _certificate(problem, _power(problem), metrics), _on_mesh(trajectory)
+    except (ValueError, RuntimeError):  # time too short for it, or not met to a billionth: nothing is claimed
+        pass
+    return {}, _on_mesh(trajectory)
+
+
+def _certificate(problem: Problem, optimum: float, metrics: Mapping[str, float]) -> dict[str, Any]:
+    """The optimum, and how far above it the answer is between its nodes; both in the unit of the objective."""
+    (term,) = problem.objective.terms
+    measured = metrics[_METRICS[term.label]]
+    above = measured / optimum - 1
+    if above < -_BELOW and term.label in _PROVEN:
+        raise InternalError(f"the answer {measured!r} is below the optimum in continuous time, {optimum!r}")
+    return {"continuous_optimum": term.weight * optimum, "above_continuous": above}
+
+
+_METRICS: Final = {
+    "energy": "energy", "power linf": "peak_power", "power l2": "rms_power", "electrical_energy": "electrical_energy",
+    "copper_loss": "copper_loss",
+}  # fmt: skip
+
+
+def _one_way_rest_to_rest(problem: Problem) -> bool:
+    move, load = problem.move, problem.load
+    states = [state.fixed(problem.order) for state in (move.start, move.end)]
+    at_rest = all(state.get(i) == 0.0 for state in states for i in range(1, problem.order))
+    placed = isinstance(move.end.position, float) and move.start_position is not None
+    plain = not move.via and not problem.vibration and problem.transcription.scheme == "exact"
+    constant = isinstance(load.inertia, float) and not any(x.varies for x in problem.limits.given().values())
+    moves = problem.one_way and move.fixed_time and placed and _distance(problem) > 0
+    return bool(at_rest and plain and constant and moves)
+
+
+def _distance(problem: Problem) -> float:
+    """How far the axis goes in its one way."""
+    end = problem.move.end.position
+    assert isinstance(end, float)
+    return problem.one_way * (end - (problem.move.start_position or 0.0))
+
+
+def _motor_alone(problem: Problem) -> bool:
+    """A motor without a jerk limit, for what it takes or loses."""
+    known = {"velocity", "acceleration", "current", "voltage"}
+    wanted = problem.objective.terms[0].minimize in ("electrical_energy", "copper_loss")
+    return wanted and problem.order == 2 and set(problem.limits.given()) <= known
+
+
+def _mass_alone(problem: Problem, metrics: Mapping[str, float]) -> bool:
+    """A mass without friction, under limits of velocity, acceleration and jerk, for what its power is; a power limit
+    that the answer does not meet is none."""
+    power = problem.limits.power
+    idle = power is not None and metrics["peak_power"] < min(power.highest, -power.lowest) * (1 - 1e-3)
+    known = {"velocity", "acceleration", "jerk", *(("power",) if idle else ())}
+    load, wanted = problem.load, problem.objective.terms[0].label in ("energy", "power linf", "power l2")
+    return wanted and not (load.viscous or load.coulomb) and problem.order <= 3 and set(problem.limits.given()) <= known
+
+
+def _ways(problem: Problem, name: str) -> tuple[float, float]:
+    """A limit along the move and against it, as sizes."""
+    limit = problem.limits.given().get(name)
+    if limit is None:
+        return inf, inf
+    along, against = limit.highest, -limit.lowest
+    return (along, against) if problem.one_way > 0 else (against, along)
+
+
+def _servo(problem: Problem) -> vd.ServoOptimum:
+    load, motor_limits = problem.load, {name: min(_ways(problem, name)) for name in ("current", "voltage")}
+    assert isinstance(load.inertia, float) and load.torque_constant and load.resistance
+    motor = vd.Servomotor(
+        load.torque_constant, load.resistance, load.inertia, load.viscous, load.coulomb, load.switching, load.eddy,
+        load.hysteresis, load.hysteresis_exponent, load.recovery,
+    )  # fmt: skip
+    faster, slower = _ways(problem, "acceleration")
+    limits = vd.Limits(_ways(problem, "velocity")[0], faster, slower, **motor_limits)
+    objective: Any = "copper" if problem.objective.terms[0].minimize == "copper_loss" else "energy"
+    return vd.optimum(motor, _distance(problem), problem.move.fixed_time or 0.0, limits, objective)
+
+
+def _power(problem: Problem) -> float:
+    duration, mass = problem.move.fixed_time or 0.0, problem.load.inertia
+    assert isinstance(mass, float)
+    faster, slower = _ways(problem, "acceleration")
+    jerk = min(_ways(problem, "jerk"))
+    axis = vd.Axis(mass, _distance(problem), duration, _ways(problem, "velocity")[0], faster, slower, jerk)
+    label = problem.objective.terms[0].label
+    if label == "energy":
+        return vd.least_energy(axis)
+    if label == "power linf":
+        return vd.least_peak_power(axis).power
+    return sqrt(vd.least_square_power(axis).value / duration)
+
+
+def _structure(optimum: vd.ServoOptimum) -> dict[str, Any]:
+    """Arcs and sub-trajectories of the optimum in continuous time, and the necessary conditions on it."""
+    found = asdict(vd.conditions(optimum)).items()
+    checked = {key: None if isinstance(x, float) and not isfinite(x) else x for key, x in found}
+    return {
+        "of": "the optimum in continuous time",
+        "sequence": optimum.sequence,
+        "arcs": [{"from": arc.start, "to": arc.end, "name": arc.name} for arc in optimum.arcs],
+        "subtrajectories": [{"from": arc.start, "to": arc.end, "name": arc.name} for arc in optimum.subtrajectories],
+        "peak_velocity": optimum.peak,
+        "conditions": checked,
+    }
+
+
+def _on_mesh(trajectory: Trajectory) -> dict[str, Any]:
+    """The arcs of a motor's one-way move, to an interval: the sign of its current, and A or V on a limit of
+    acceleration or velocity, U elsewhere; Z without current. Empty without a motor."""
+    problem = trajectory.problem
+    if not problem.load.torque_constant or not problem.one_way or trajectory.scheme.terms == 1:
+        return {}
+    current, velocity, acceleration = (_middles(trajectory, name) for name in ("current", "velocity", "acceleration"))
+    names = []
+    for u, v, a in zip(problem.one_way * current, velocity, acceleration, strict=True):
+        limited = "A" if _on_limit(problem, "acceleration", a) else "V" if _on_limit(problem, "velocity", v) else "U"
+        sign = "P" if u > 0 else "N"
+        names.append("Z" if abs(u) <= _ZERO * np.max(np.abs(current)) else sign + limited)
+    arcs: list[dict[str, Any]] = []
+    k = 0
+    for name, group in groupby(names):
+        count = len(list(group))
+        arcs.append({"from": float(trajectory.time[k]), "to": float(trajectory.time[k + count]), "name": name})
+        k += count
+    return {"of": "the trajectory, to an interval", "sequence": "-".join(arc["name"] for arc in arcs), "arcs": arcs}
+
+
+def _middles(trajectory: Trajectory, name: str) -> Any:
+    """(N,) a signal in the middle of the intervals, roughly: the mean of its Bernstein coefficients."""
+    return np.mean(np.stack(np.broadcast_arrays(*trajectory.signal(name).pieces)), axis=0)
+
+
+def _on_limit(problem: Problem, name: str, value: float) -> bool:
+    limit = problem.limits.given().get(name)
+    if limit is None:
+        return False
+    sides = (side for side in (limit.lowest, limit.highest) if side and isfinite(side))
+    return any(abs(value - side) <= _AT * abs(side) for side in sides)
