@@ -64,6 +64,19 @@ def test_random_plants_are_proven(seed: int) -> None:
     assert fault(seed) == ""
 
 
+@pytest.mark.parametrize("seed", [4, 17, 18, 46])  # stiff, repeated, at zero: hard on eigenvalues and on the proof
+def test_matrices_and_doubled_poles_are_proven(seed: int) -> None:
+    plant = random_problem(seed).plant
+    a, b, c, d = plant.model.matrices
+    turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((len(a), len(a))))[0]
+    stated = {"A": turn @ a @ turn.T, "B": turn @ b, "C": c @ turn.T, "D": d, "robust": "zvd"}
+    turned = PlantProblem(plant=stated | {"input": plant.input, "final_value": plant.final_value})
+    given = PlantProblem(plant=plant.model_copy(update={"robust": "zvd"}))
+    solutions = [trajopt.solve(problem) for problem in (given, turned)]
+    assert all(solution.status is trajopt.Verdict.SOLVED for solution in solutions)
+    assert solutions[1].duration == pytest.approx(solutions[0].duration, rel=1e-7)
+
+
 def test_switches_that_meet_are_left_out() -> None:
     solution = trajopt.solve(random_problem(99))  # sigma touches zero: an arc of no length
     times = np.array([0.0, *solution.command.switches, solution.duration])

@@ -98,6 +98,21 @@ def test_friction_problem_keeps_its_limit_by_time_and_a_little_jerk_costs_little
     assert solution.metrics["rms_jerk"] < 0.75 * alone.metrics["rms_jerk"]
 
 
+def test_morals_of_the_plants_in_numbers() -> None:
+    names = ("two_masses_and_a_spring", "two_masses_and_a_spring_zvd", "motor_with_lag", "damped_mode_and_lag")
+    spring, zvd, motor, mode = (solved(trajopt.load(name)) for name in names)
+    assert spring.duration == pytest.approx(1.49 * 2 * np.sqrt(2), rel=2e-3)  # rigid, of the same mass
+    assert zvd.duration == pytest.approx(1.39 * spring.duration, rel=2e-3)
+    for off in (0.9, 1.1):
+        left = [
+            s.residual_vibration(off * np.sqrt(2) / 2 / np.pi) * np.sum(np.abs(s.command.impulses[1]))
+            for s in (spring, zvd)
+        ]
+        assert left[1] / left[0] == pytest.approx(1 / 6, rel=0.05)
+    assert motor.command.switches[0] / motor.duration == pytest.approx(0.8, abs=5e-3)
+    assert mode.duration * mode.metrics["mode1_frequency"] == pytest.approx(0.52, abs=5e-3)
+
+
 def test_a_tenfold_jerk_limit_makes_l2_and_linf_alike() -> None:
     velocity = {}
     for name in ("l2", "linf", "l2_jerk10", "linf_jerk10"):

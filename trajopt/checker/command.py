@@ -24,7 +24,7 @@ import numpy as np
 
 from trajopt.checker.case import Array
 from trajopt.checker.command_reading import FORMAT, Commanded, read_command
-from trajopt.checker.linear_system import System, chain, series
+from trajopt.checker.linear_system import System, chain
 from trajopt.checker.report import Check, question
 from trajopt.checker.result_file import _text as read_text
 
@@ -143,8 +143,8 @@ def _close(name: str, time: float | None, value: float, wanted: float, tolerance
 
 
 def _augmented(x: Commanded) -> System:
-    """The plant behind a filter of the added poles: it rests only if their modes do."""
-    return series([chain(x.added, (), 1.0), x.plant]).balanced() if x.added else x.plant
+    """A chain of the plant's poles and the added ones: it rests only if all their modes do."""
+    return chain([*x.poles, *x.added], (), 1.0).balanced()
 
 
 def _driven(system: System, x: Commanded, points: int = 8) -> tuple[Array, Array]:
@@ -187,15 +187,15 @@ def _proof(x: Commanded) -> tuple[float, float] | None:
     row = _row(system, x)
     if row is None:
         return None
-    s, input_up = _samples(system, x)
+    s, level = _samples(system, x)
     exponentials, integrals = system.reached(s)
     waves = exponentials @ system.b
     sigma, area = waves @ row, integrals @ row
-    inner = input_up != 0
-    astray = -(sigma * input_up) / np.maximum(np.abs(waves) @ np.abs(row), 1e-300)
-    target = float(row @ _driven(system, x)[0][-1])
+    input_up = np.where(np.isin(s, x.backward), 0.0, level - (x.low + x.high) / 2)
+    astray = -(sigma * np.sign(input_up)) / np.maximum(np.abs(waves) @ np.abs(row), 1e-300)
+    target = float(np.diff(area) @ level[:-1])
     bound = _first_reached(system, row, s, area, target, (x.low, x.high))
-    return float(np.max(astray[inner], initial=0.0)), bound * x.duration
+    return float(np.max(astray, initial=0.0)), bound * x.duration
 
 
 def _row(system: System, x: Commanded) -> Array | None:
@@ -221,8 +221,7 @@ def _row(system: System, x: Commanded) -> Array | None:
 
 
 def _samples(system: System, x: Commanded) -> tuple[Array, Array]:
-    """Backward times, rising from 0 to 1, that resolve every arc, oscillation and decay; and the sign of the input
-    about the middle of its limits at each, 0 at its jumps."""
+    """Backward times, rising from 0 to 1, that resolve every arc, oscillation and decay; the input from each on."""
     ends = x.backward[::-1]
     poles = np.linalg.eigvals(system.a)
     count = int(np.clip(_PERIOD * np.max(np.abs(poles.imag)) / (2 * np.pi), 400, _MOST))
@@ -231,8 +230,7 @@ def _samples(system: System, x: Commanded) -> tuple[Array, Array]:
     s = np.unique(np.concatenate([*parts, ends]))
     s = s[(s >= 0) & (s <= 1)]
     arc = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(ends) - 2)
-    up = np.sign(x.levels[::-1] - (x.low + x.high) / 2)[arc]
-    return s, np.where(np.isin(s, ends), 0.0, up)
+    return s, x.levels[::-1][arc]
 
 
 def _first_reached(

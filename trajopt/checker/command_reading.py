@@ -35,9 +35,11 @@ _ONE: Final = 1e-3  # of their size: computed poles nearer than this are one
 
 @dataclass(frozen=True)
 class Commanded:
-    """A command and its plant, in times of its duration: ``added`` poles are those that robustness asks for."""
+    """A command and its plant, in times of its duration: ``added`` poles are those that robustness asks for
+    besides the plant's."""
 
     plant: System
+    poles: tuple[complex, ...]
     added: tuple[complex, ...]
     modes: tuple[complex, ...]
     low: float
@@ -98,7 +100,7 @@ def read_command(result: Mapping[str, Any], notes: list[str]) -> Commanded | Non
         str(name): _number(value, f"metrics.{name}") for name, value in _mapping(result["metrics"], "metrics").items()
     }
     return Commanded(
-        plant=plant, added=added, modes=_upper(poles), low=low, high=high,
+        plant=plant, poles=tuple(poles), added=added, modes=_upper(poles), low=low, high=high,
         final_value=_number(stated.get("final_value"), "plant.final_value"),
         wanted_input=None if wanted is None else _number(wanted, "plant.final_input"),
         time=time, levels=levels, final_input=_number(command.get("final_input"), "command.final_input"),
@@ -116,9 +118,8 @@ def _plant(stated: Mapping[str, Any], duration: float) -> tuple[System, list[com
         a = np.array(rows) if len({len(row) for row in rows}) == 1 else np.empty(0)
         if not 0 < len(b) <= _MOST_STATES or a.shape != (len(b), len(b)) or len(c) != len(b):
             raise Malformed("plant: A, B and C do not fit together")
-        a = a * duration
-        poles = [complex(p) for p in np.linalg.eigvals(a)]
-        return System(a, b * duration, c, _number(stated.get("D", 0.0), "plant.D")).balanced(), poles
+        system = System(a * duration, b * duration, c, _number(stated.get("D", 0.0), "plant.D")).balanced()
+        return system, _eigenvalues(system.a)
     if stated.get("poles") is not None:
         poles, zeros = (_roots(stated.get(key, ()), f"plant.{key}") for key in ("poles", "zeros"))
         gain = _number(stated.get("gain", 1.0), "plant.gain")
@@ -134,6 +135,17 @@ def _plant(stated: Mapping[str, Any], duration: float) -> tuple[System, list[com
         raise Malformed("plant: it must have poles, and not more zeros")
     poles, zeros = ([p * duration for p in roots] for roots in (poles, zeros))
     return chain(poles, zeros, gain * duration ** (len(poles) - len(zeros))).balanced(), poles
+
+
+def _eigenvalues(a: Array) -> list[complex]:
+    """The eigenvalues by size; those that rounding tells from a repeated one at zero only are zero."""
+    found = sorted((complex(p) for p in np.linalg.eigvals(a)), key=abs)
+    rounding = 64 * len(a) * np.finfo(float).eps
+    for count in range(len(a), 0, -1):
+        sizes = np.linalg.norm(a) ** np.arange(1, count + 1)
+        if np.all(np.abs(np.poly(found[:count])[1:]) <= rounding * sizes):
+            return [0j] * count + found[count:]
+    return found
 
 
 def _added(robust: Any, poles: list[complex], duration: float) -> tuple[complex, ...]:

@@ -75,7 +75,7 @@ def chain(poles: Sequence[complex], zeros: Sequence[complex], gain: float) -> Sy
     tops = _pairs(zeros)
     sections = []
     for pair in _pairs(poles):
-        fitting = next((top for top in tops if len(top) <= len(pair)), None)
+        fitting = max((top for top in tops if len(top) <= len(pair)), key=len, default=None)
         top = () if fitting is None else tops.pop(tops.index(fitting))
         section, size = _section(pair, top)
         sections.append(section)
@@ -101,10 +101,12 @@ def series(systems: Sequence[System]) -> System:
 
 
 def _pairs(roots: Sequence[complex]) -> list[tuple[complex, ...]]:
-    """Conjugate pairs, then real roots two by two, a last one alone."""
-    real = sorted((r for r in roots if not r.imag), key=abs)
+    """Conjugate pairs and real roots two by two, the last one alone; the fastest first, so that the states behind are
+    not copies of those before."""
+    real = sorted((r for r in roots if not r.imag), key=abs, reverse=True)
     pairs: list[tuple[complex, ...]] = [(r, r.conjugate()) for r in roots if r.imag > 0]
-    return pairs + [tuple(real[i : i + 2]) for i in range(0, len(real), 2)]
+    pairs += [tuple(real[i : i + 2]) for i in range(0, len(real), 2)]
+    return sorted(pairs, key=lambda pair: -abs(pair[0]))
 
 
 def _section(poles: tuple[complex, ...], zeros: tuple[complex, ...]) -> tuple[System, float]:
