@@ -44,8 +44,10 @@ def test_price_of_a_least_time(solver: str, model: str) -> None:
     problem = clemen_rupp(*overrides, f"transcription.solver={solver}")
     solution = trajopt.solve(problem)
     assert solution.route.model == model
-    assert {price["name"] for price in solution.prices} == {"velocity.max", "acceleration", "jerk"}
-    for price in solution.prices:
+    prices = [price for price in solution.prices if price["per_unit"]]
+    assert {price["name"] for price in prices} == {"velocity.max", "acceleration", "jerk"}
+    assert {price["name"] for price in solution.prices} == {"velocity.max", "velocity.min", "acceleration", "jerk"}
+    for price in prices:
         more, less = (trajopt.solve(changed(problem, price["name"], 1 + s)).duration for s in (STEP, -STEP))
         assert price["per_percent"] == pytest.approx((more - less) / (2 * STEP) / solution.duration / 100, rel=2e-3)  # type: ignore[operator]
 

@@ -117,7 +117,7 @@ def test_a_force_limit_is_an_acceleration_limit() -> None:
     force = solved(shortest(0.5, limits={"velocity": 1.0, "force": 20.0}, load={"inertia": 4.0}))
     plain = solved(shortest(0.5, limits={"velocity": 1.0, "acceleration": 5.0}))
     assert force.route.model == "arcs" and force.duration == pytest.approx(plain.duration, rel=1e-12)
-    assert {price["name"] for price in force.prices} == {"velocity", "force"}
+    assert {price["name"] for price in force.prices if price["per_unit"]} == {"velocity", "force"}
     one_way = {"velocity": (0.0, 1.0), "force": 20.0}
     friction = solved(shortest(0.5, limits=one_way, load={"inertia": 4.0, "coulomb": 4.0}))
     assert friction.route.model == "arcs" and friction.metrics["peak_force"] <= 20.0 * (1 + 1e-9)

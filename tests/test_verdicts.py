@@ -74,9 +74,9 @@ class Impatient(Clock):
 @pytest.mark.parametrize("ends", [{}, {"velocity": 0.2}], ids=["at rest", "moving"])
 def test_a_limit_that_strikes_at_any_moment_of_an_explanation_is_no_bug(ends: dict[str, float]) -> None:
     limits = {"velocity": (0.0, 0.5), "acceleration": 4.905, "jerk": 98.1}
-    given = {"distance": 0.254, "time": 0.5, "limits": limits, "start": ends, "end": ends, "intervals": 12}
+    given = {"distance": 0.254, "time": 0.5, "limits": limits, "start": ends, "end": ends, "intervals": 8}
     setting = Setting.of(axis("jerk", "l2", **given))
-    for looks in range(0, 40, 3):
+    for looks in range(0, 30, 5):
         assert explain(setting, Impatient(looks))["text"]
 
 

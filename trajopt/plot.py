@@ -88,7 +88,7 @@ def plot_prices(solution: Solution) -> Axes:
     from trajopt.report import objective_label
 
     _moved(solution)
-    rows = [price for price in reversed(solution.prices) if price["per_percent"] is not None]
+    rows = [price for price in reversed(solution.prices) if price["per_percent"]]
     figure = Figure(figsize=(7.0, 1.2 + 0.4 * max(len(rows), 1)), layout="constrained")
     axes = figure.subplots()
     values = [100 * row["per_percent"] for row in rows]

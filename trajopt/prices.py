@@ -20,7 +20,7 @@ _STEP: Final = 1e-4  # of the duration, for the central difference of the Lagran
 
 
 def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float) -> list[dict[str, Any]]:
-    """The prices of the limits and of the time, the most effective first; those of no effect are left out.
+    """The prices of the limits and of the time, the most effective first; those of no effect last, at zero.
 
     Each: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI objective
     per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened by 1 %;
@@ -74,13 +74,22 @@ def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float
     """Rows as `prices` returns them, from name -> (objective per SI unit of the limit, per unit of its own value)."""
     kinds = units.kinds(problem.rotary)
     rows: list[dict[str, Any]] = []
-    for name, (unit, own) in found.items():
-        if value and abs(own) > 1e-7 * abs(value):
-            relative = None if _is_zero(problem, name) else own / 100 / value
-            rows.append(
-                {"name": name, "per_unit": unit, "unit": kinds[name.partition(".")[0]].unit, "per_percent": relative}
-            )
-    return sorted(rows, key=lambda row: -abs(row["per_percent"] or 0.0))
+    for name in dict.fromkeys([*found, *_names(problem)]):
+        unit, own = found.get(name, (0.0, 0.0))
+        acts = bool(value) and abs(own) > 1e-7 * abs(value)
+        relative = 0.0 if not acts else None if _is_zero(problem, name) else own / 100 / value
+        symbol = kinds[name.partition(".")[0]].unit
+        rows.append({"name": name, "per_unit": unit if acts else 0.0, "unit": symbol, "per_percent": relative})
+    return sorted(rows, key=lambda row: (not row["per_unit"], -abs(row["per_percent"] or 0.0)))
+
+
+def _names(problem: Problem) -> list[str]:
+    """Every limit by the name of its price: as a whole where it is symmetric, else by its sides."""
+    names: list[str] = []
+    for quantity, limit in problem.limits.given().items():
+        sides = [f"{quantity}.{side}" for side in ("min", "max") if getattr(limit, side) is not None]
+        names += [quantity] if limit.symmetric else sides
+    return names
 
 
 def _is_zero(problem: Problem, name: str) -> bool:

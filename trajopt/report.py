@@ -51,7 +51,7 @@ def print_solution(solution: Solution | PlantSolution) -> None:
     if (optimum := solution.certificate.get("continuous_optimum")) is not None:
         above = 100 * solution.certificate["above_continuous"]
         console.print(f"in continuous time the optimum is {optimum:.9g}; this move is {above:.2g} % above it")
-    for row in solution.prices[:3]:
+    for row in [row for row in solution.prices if row["per_unit"]][:3]:
         console.print(f"  {sentence(row, solution.problem.shown(row['name']), objective_label(solution))}")
     for line in _structure_text(solution.structure):
         console.print(f"  {line}")

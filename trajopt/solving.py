@@ -30,7 +30,7 @@ from trajopt.transcribe import Setting, drawn_in, prescribed, without
 from trajopt.verdict import Verdict
 
 _DRAWN = 3e-9  # of a limit
-_LATER = 1e-7  # of a least time
+_LATER = 2e-8  # of a least time
 
 
 def solve(problem: Problem, seconds: float | None = None) -> Solution:
