@@ -146,3 +146,51 @@ def test_a_power_limit_that_stays_inactive_leaves_the_arcs() -> None:
     assert solution.route.model == "arcs" and solution.status is Verdict.SOLVED
     limited = solved(shortest(limits={**S_LIMITS, "power": 5.0}, load={"inertia": 10.0}, intervals=40))
     assert limited.duration > solution.duration and limited.metrics["peak_power"] <= 5.0 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("limits", [A3, {name: A3[name] for name in ("velocity", "acceleration", "jerk")}])
+@pytest.mark.parametrize("distance", [30.0, 1000.0])
+def test_long_cruises_do_not_drift(distance: float, limits: dict[str, float]) -> None:
+    solution = solved(shortest(distance, limits=limits))
+    assert solution.route.model == "arcs" and solution.status is Verdict.SOLVED
+    assert solution.duration == pytest.approx(distance + (0.08 if "snap" in limits else 0.07), rel=1e-6)
+    assert trajopt.check(solution.to_dict(), strict=True).passed
+
+
+def test_a_dwell_that_no_move_keeps_is_not_put_aside() -> None:
+    problem = shortest(0.3, limits=A3)
+    grid = problem.transcription.model_copy(update={"min_dwell": 10.0})
+    solution = trajopt.solve(problem.replace(transcription=grid))
+    assert solution.status is Verdict.UNDECIDED and "spacing" in solution.message
+
+
+def test_a_move_that_ends_in_its_first_state_is_refused() -> None:
+    moving = {"velocity": 0.5}
+    with pytest.raises(trajopt.BadInput, match="in the state in which it starts"):
+        shortest(0.0, limits=S_LIMITS, start=moving, end=moving)
+
+
+def test_a_velocity_that_may_not_rest_is_no_bug() -> None:
+    limits = {"velocity": (0.5, 4.0), "snap": 10.0}
+    ends = {"velocity": 1.0}
+    solution = trajopt.solve(shortest(1.0, limits=limits, start=ends, end=ends, intervals=30))
+    assert solution.status.solved
+    assert solution.metrics["peak_velocity"] <= 4.0 * (1 + 1e-9)
+
+
+def test_vibration_with_a_time_that_is_no_search_is_refused() -> None:
+    problem = shortest(0.3, limits={**S_LIMITS, "power": 4.0}, load={"inertia": 10.0}, intervals=20)
+    quiet = problem.replace(vibration=(trajopt.Vibration(frequency=3.0),))
+    with pytest.raises(trajopt.BadInput, match="vibration: a free time"):
+        trajopt.solve(quiet)
+    moving = shortest(0.3, limits=S_LIMITS, start={"velocity": 0.1}, end={"velocity": 0.3}, intervals=20)
+    with pytest.raises(trajopt.BadInput, match="vibration: a free time"):
+        trajopt.solve(moving.replace(vibration=(trajopt.Vibration(frequency=3.0),)))
+
+
+def test_chattering_with_a_moving_end_is_said() -> None:
+    limits = {"velocity": 1.0, "acceleration": 1.5, "jerk": 4.0, "snap": 20.0}
+    solution = solved(shortest(6.0, limits=limits, start={"velocity": 1.0}))
+    if solution.route.model == "arcs":
+        assert solution.structure["chatters"]
+        assert len(solution.plot_arcs()) >= 1

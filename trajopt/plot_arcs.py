@@ -63,16 +63,19 @@ def _timeline(axes: Axes, arcs: list[dict[str, Any]], touches: Any) -> None:
 
 
 def _towards_the_cruise(axes: Axes, arcs: list[dict[str, Any]], label: str) -> None:
-    """The top derivative of the arcs before the longest one, the cruise: each touch is the last one drawn smaller."""
+    """The top derivative of the arcs before the longest one, the cruise (after it, where the move begins with it): each
+    touch is the last one drawn smaller."""
     cruise = max(range(len(arcs)), key=lambda k: arcs[k]["to"] - arcs[k]["from"])
-    end, before = arcs[cruise]["from"], arcs[:cruise]
-    left = np.array([end - arc["from"] for arc in before] + [end - before[-1]["to"]])
-    left[-1] = max(left[-1], 0.3 * left[-2])
-    top = np.array([arc["top"] for arc in before])
-    axes.stairs(top[::-1], left[::-1], color=COLOURS[0], linewidth=1.4, baseline=None)
+    near, far, beside = ("to", "from", arcs[:cruise]) if cruise else ("from", "to", arcs[:0:-1])
+    border = arcs[cruise][far] if cruise else arcs[cruise]["to"]
+    away = np.abs(np.array([arc[far] for arc in beside] + [beside[-1][near]]) - border)
+    away[-1] = max(away[-1], 0.3 * away[-2])
+    top = np.array([arc["top"] for arc in beside])
+    axes.stairs(top[::-1], away[::-1], color=COLOURS[0], linewidth=1.4, baseline=None)
     axes.set_xscale("log")
-    axes.invert_xaxis()
-    axes.set_xlabel("time left until the cruise [s], logarithmic", fontsize=8)
+    if cruise:
+        axes.invert_xaxis()
+    axes.set_xlabel(f"time {'left until' if cruise else 'since'} the cruise [s], logarithmic", fontsize=8)
     axes.set_ylabel(label, fontsize=8)
     axes.grid(color="0.92", linewidth=0.7)
     axes.set_axisbelow(True)

@@ -90,7 +90,7 @@ def _time(problem: Problem) -> None:
         if only:
             raise ValueError('limits: nothing bounds the move: least time needs one such as acceleration = "5 m/s^2"')
     if problem.move.time == "free" and _stays(problem):
-        raise ValueError("move.end: the move ends where it starts, at rest: it takes no time; give move.time")
+        raise ValueError("move.end: the move ends in the state in which it starts: it takes no time; give move.time")
     if any(limit.varies for limit in problem.limits.given().values()) or problem.move.via:
         raise ValueError('move.time: limits by time and via states need a fixed move.time such as "1 s"')
     if problem.load.inertia is not None and not isinstance(problem.load.inertia, float):
@@ -98,9 +98,9 @@ def _time(problem: Problem) -> None:
 
 
 def _stays(problem: Problem) -> bool:
-    """Whether the move starts and ends at the same place, at rest."""
+    """Whether the move ends in the very state in which it starts."""
     start, end = (state.fixed(problem.order) for state in (problem.move.start, problem.move.end))
-    return start == end and start.keys() == set(range(problem.order)) and not any(list(start.values())[1:])
+    return start == end and start.keys() == set(range(problem.order))
 
 
 def _load(problem: Problem) -> None:

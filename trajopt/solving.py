@@ -56,7 +56,8 @@ def _solve(problem: Problem, clock: Clock) -> Solution:
             return solution
     if chosen.model == "arcs":
         solution = _by_arcs(setting, chosen, clock)
-        if solution.status.solved or solution.status is Verdict.IMPOSSIBLE:
+        cut_off = problem.transcription.min_dwell > 0 or problem.transcription.touches is not None
+        if solution.status.solved or solution.status is Verdict.IMPOSSIBLE or cut_off:
             return solution
         on_mesh = route_on_mesh(problem)
         chosen = on_mesh.because(f"{on_mesh.reason} (switching times: {solution.message})")

@@ -8,8 +8,9 @@ continuous move satisfies, is infeasible at a duration shorter by a billionth. F
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from math import inf
+from math import factorial, inf
 from typing import Any, Final
 
 import numpy as np
@@ -21,12 +22,13 @@ from trajopt.model import Claim, Outcome
 from trajopt.outer import is_impossible
 from trajopt.prices import ranked
 from trajopt.problem import DERIVATIVES, FREE, Problem
-from trajopt.rebuild import rebuild
 from trajopt.switching import Arcs, Chain, Impossible, Unresolved, shortest
+from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
 
 _SHORTER: Final = (1e-9, 1e-8, 1e-7, 1e-6)  # relative: the first that is proven impossible bounds the least time
 _STEP: Final = 1e-5  # of a limit, for its price
+_SAME: Final = 1e-14  # of the duration: times closer than this are one
 _BESIDE: Final = 8  # uniform nodes beside the switches, for the proof
 
 
@@ -68,7 +70,8 @@ def _acceleration(problem: Problem) -> tuple[float, float] | None:
     if load.viscous or not isinstance(load.inertia, float) or (load.coulomb and not way):
         return None
     drag = way * load.coulomb
-    return max(low, (force.lowest - drag) / load.inertia), min(high, (force.highest - drag) / load.inertia)
+    low, high = max(low, (force.lowest - drag) / load.inertia), min(high, (force.highest - drag) / load.inertia)
+    return (low, high) if low < 0 < high else None
 
 
 def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:
@@ -78,16 +81,50 @@ def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:
     """
     wanted = setting.problem.transcription
     arcs = shortest(chain, wanted.min_dwell, wanted.touches)
-    fractions = np.array(arcs.switches) / arcs.duration
-    mesh = _with(setting.mesh.fractions, fractions)
-    middles = (mesh.fractions[1:] + mesh.fractions[:-1]) / 2
-    top = np.array(arcs.tops)[np.searchsorted(fractions, middles)]
-    start = np.array([*chain.start])
-    start[0] -= setting.problem.move.start_position or 0.0
-    trajectory = rebuild(setting.problem, mesh, setting.scheme, setting.sizes, arcs.duration, start, top)
+    trajectory = _trajectory(setting, chain, arcs)
     bound, about = _bound(setting, chain, arcs, clock)
     notes = {"structure": _structure(arcs, bound), "bounds": about, "prices": _prices(setting.problem, arcs)}
     return Attempt(Outcome(Claim.OPTIMAL, "switching times"), trajectory, arcs.duration, bound, notes=notes)
+
+
+def _trajectory(setting: Setting, chain: Chain, arcs: Arcs) -> Trajectory:
+    """The move over a mesh with nodes at the switches, its states taken from the arcs.
+
+    Times of switches are rounded, and over a long cruise even 1e-14 s of snap adds up: the top derivative is what leads
+    from node to node, not that of the arcs.
+    """
+    mesh = _with(setting.mesh.fractions, np.array(arcs.switches) / arcs.duration)
+    time = mesh.fractions * arcs.duration
+    begins = np.array([0.0, *arcs.switches])
+    which = np.clip(np.searchsorted(begins, time * (1 + _SAME) + _SAME * arcs.duration, side="right") - 1, 0, None)
+    nodes = [int(np.argmin(np.abs(time - t))) for t in begins]
+    found = np.empty((chain.order, len(time)))
+    states = [*_states(chain, arcs)]
+    for k, state in enumerate(states):
+        inside = which == k
+        since = time[inside] - time[nodes[k]]
+        full = np.append(state, arcs.tops[k])
+        for i in range(chain.order):
+            found[i, inside] = sum(since**r / factorial(r) * x for r, x in enumerate(full[i:]))
+    found[:, -1] = chain.end
+    top = np.diff(found[-1]) / np.diff(time)
+    found[0] -= chain.start[0]
+    kept = (setting.problem, mesh, setting.scheme, setting.sizes, arcs.duration)
+    return Trajectory(*kept, chain.start[0], (*found, top))
+
+
+def _states(chain: Chain, arcs: Arcs) -> Iterator[Floats]:
+    """(order,) the state at the beginning of every arc; on a plateau exactly on its limit, and still above it."""
+    state = np.array(chain.start)
+    for duration, top, active in zip(arcs.durations, arcs.tops, arcs.active, strict=True):
+        name, _, side = active.partition(".")
+        i = DERIVATIVES.index(name)
+        if i < chain.order:
+            state[i], state[i + 1 :] = chain.limits[i][side == "max"], 0.0
+        yield state.copy()
+        full = np.append(state, top)
+        terms = [full[i:] * [duration**r / factorial(r) for r in range(len(full) - i)] for i in range(chain.order)]
+        state = np.array([float(np.sum(term)) for term in terms])
 
 
 def _with(uniform: Floats, switches: Floats) -> Mesh:
@@ -158,5 +195,6 @@ def _structure(arcs: Arcs, bound: float) -> dict[str, Any]:
     }
     if arcs.ordinary is not None:
         found["s_curve"] = {"duration": arcs.ordinary, "loss": arcs.ordinary / arcs.duration - 1}
-        found["chatters"] = arcs.chatters
+    if arcs.chatters:
+        found["chatters"] = True
     return found

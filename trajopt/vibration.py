@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.errors import BadInput
 from trajopt.mesh import Floats
 from trajopt.problem import Vibration
 
@@ -61,8 +62,14 @@ def modes(vibration: Vibration, duration: float) -> list[Mode]:
 
 
 def rows(transcript: Any, vibration: Vibration) -> None:
-    """Hold the residual vibration of a transcribed move at zero, or below what is allowed, on its model."""
+    """Hold the residual vibration of a transcribed move at zero, or below what is allowed, on its model.
+
+    Raises BadInput where the duration is an unknown of the model: the rows are linear at a fixed one only.
+    """
     model, chain, duration = transcript.model, transcript.chain, transcript.duration
+    if not isinstance(duration, float):
+        raise BadInput('vibration: a free time goes with it only where one end is at rest and no power is limited;'
+                       ' write a fixed move.time such as "1 s"')  # fmt: skip
     steps, size = transcript.mesh.steps * duration, transcript.sizes.derivative[1]
     for mode in modes(vibration, duration):
         parts = [kernels(mode, steps, len(chain) - 2)]

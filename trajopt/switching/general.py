@@ -111,7 +111,7 @@ def _lower_orders(chain: Chain) -> float:
     found = [0.0]
     for order in range(1, chain.order + (chain.order < 4)):
         limits = chain.limits[: order + 1]
-        if all(map(isfinite, limits[-1])) and (order == 1 or limits[-1][0] < 0 < limits[-1][1]):
+        if all(map(isfinite, limits[-1])) and limits[-1][0] < 0 < limits[-1][1]:
             part = Chain(order, ((-inf, inf), *limits[1:]), chain.start[:order], chain.end[:order])
             try:
                 found.append(shortest_low(part).duration if part.start != part.end else 0.0)
