@@ -137,14 +137,14 @@ def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Cloc
     with the limits drawn in a little, and what the rungs make of it that were not needed."""
     yield break_tie(lean, first, chosen, clock)
     yield first, chosen
-    if first.trajectory is None or first.gap > ENOUGH or chosen.solver != "clarabel":
+    if first.trajectory is None or chosen.solver != "clarabel":
         return
     inner = convex(drawn_in(lean, _DRAWN), first.trajectory.duration, to(lean.problem.objective), clock)
     if inner.trajectory is not None:
         yield replace(inner, bound=first.bound, notes=first.notes), chosen
     from trajopt.model_cvxpy import LADDER
 
-    for rung in LADDER[1:]:
+    for rung in LADDER[1:] if first.gap <= ENOUGH else ():
         other = convex(lean, first.trajectory.duration, to(lean.problem.objective), clock, rung)
         if other.trajectory is not None:
             yield _priced(lean, other, clock), chosen
