@@ -81,9 +81,12 @@ def test_limits_hold_at_every_instant_of_a_chattering_move() -> None:
     assert solution.structure["chatters"] and len(solution.structure["touches"]) >= 2
     report = trajopt.check(solution.to_dict(), strict=True)
     assert report.passed, report.summary()
-    period = solution.at(np.arange(0.0, solution.duration, 1e-3))  # as a controller samples it
+    period = solution.sampled(1e-3)  # as a controller samples it
+    assert period["time"].iloc[-1] == solution.duration and len(period) == 381
     for name, limit in A3.items():
         assert np.max(np.abs(period[name])) <= limit * (1 + 1e-9)
+    with pytest.raises(ValueError, match="period: must be > 0"):
+        solution.sampled(1.0)
 
 
 @pytest.mark.parametrize("limits", [{"velocity": 1.0, "snap": 1.0}, {"velocity": 1.0, "jerk": 2.0, "snap": 1.0}])
@@ -194,3 +197,24 @@ def test_chattering_with_a_moving_end_is_said() -> None:
     if solution.route.model == "arcs":
         assert solution.structure["chatters"]
         assert len(solution.plot_arcs()) >= 1
+
+
+def test_time_may_run_backwards() -> None:
+    """Forwards no structure is found for the second; it is the first, run backwards."""
+    limits = {"velocity": 1.0, "acceleration": 1.5, "jerk": 4.0, "snap": 20.0}
+    first = solved(shortest(6.0, limits=limits, start={"velocity": 1.0}))
+    second = solved(shortest(6.0, limits=limits, end={"velocity": 1.0}))
+    assert first.route.model == second.route.model == "arcs"
+    assert second.duration == pytest.approx(first.duration, rel=1e-9)
+    assert second.duration == pytest.approx(6.6206426, rel=1e-7)
+    assert trajopt.check(second.to_dict(), strict=True).passed
+
+
+def test_a_stiff_snap_limit_with_moving_ends_keeps_a_bound_in_continuous_time() -> None:
+    limits = {"velocity": 1.0, "acceleration": 2.0, "jerk": 20.0, "snap": 5e4}
+    ends: dict[str, Any] = {"start": {"velocity": 0.3}, "end": {"velocity": -0.4}}
+    stiff = solved(shortest(1.5, limits=limits, intervals=80, **ends))
+    third = solved(shortest(1.5, limits={k: x for k, x in limits.items() if k != "snap"}, **ends))
+    assert stiff.certificate["lower_bound"] == pytest.approx(third.duration, rel=1e-9)
+    assert third.duration <= stiff.duration <= third.duration * 1.02
+    assert trajopt.check(stiff.to_dict()).passed

@@ -82,6 +82,23 @@ class Solution:
 
         return frame(self._moved())
 
+    def sampled(self, period: float) -> pd.DataFrame:
+        """The set-points of a controller: time (s), position, velocity, … at every ``period`` (s) and at the end.
+
+        They are values of the move itself, so that all limits hold at them. Raises NoSolution, and ValueError for a
+        period that is not positive or longer than the move.
+        """
+        import numpy as np
+        import pandas as pd
+
+        duration = self._moved().duration
+        if not 0 < period <= duration:
+            raise ValueError(f"period: must be > 0 and at most the duration of {duration:g} s, got {period!r}")
+        count = int(duration / period * (1 + 1e-12))
+        time = np.minimum(period * np.arange(count + 1), duration)
+        time = time if duration - time[-1] <= 1e-9 * period else np.append(time, duration)
+        return pd.DataFrame({"time": time, **self.at(time)})
+
     def at(self, t: Any) -> dict[str, Any]:
         """Position and its derivatives at times ``t`` (s), by the exact interpolant. Raises NoSolution, ValueError."""
         return self._moved().at(t)

@@ -21,7 +21,7 @@ from trajopt.quantities import is_affine
 from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
 from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
-from trajopt.switching_times import as_chain, fastest
+from trajopt.switching_times import as_chain, fastest, floor
 from trajopt.ties import break_tie, tied_route
 from trajopt.tighten import tighten
 from trajopt.time_search import minimum_time
@@ -41,6 +41,10 @@ def solve(problem: Problem, seconds: float | None = None) -> Solution:
         return solution
     since = perf_counter()
     certificate, structure = findings(problem, solution.trajectory, solution.metrics)
+    if solution.certificate["lower_bound"] is None and (least := floor(problem)) is not None:
+        assert solution.duration is not None
+        gap = 1 - least / solution.duration
+        certificate = {"lower_bound": least, "gap": gap, "bounds": "every move in continuous time"}
     clock.charge("continuous time", since)
     found = {**solution.certificate, **certificate}
     return replace(solution, certificate=found, structure={**structure, **solution.structure}, timings=clock.timings())

@@ -21,7 +21,7 @@ from trajopt.mesh import Floats, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.outer import is_impossible
 from trajopt.prices import ranked
-from trajopt.problem import DERIVATIVES, FREE, Problem
+from trajopt.problem import DERIVATIVES, FREE, Problem, State
 from trajopt.switching import Arcs, Chain, Impossible, Unresolved, shortest
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
@@ -72,6 +72,23 @@ def _acceleration(problem: Problem) -> tuple[float, float] | None:
     drag = way * load.coulomb
     low, high = max(low, (force.lowest - drag) / load.inertia), min(high, (force.highest - drag) / load.inertia)
     return (low, high) if low < 0 < high else None
+
+
+def floor(problem: Problem) -> float | None:
+    """A lower bound on a least time, in continuous time: that of the chain without its snap limit; None where that is
+    not known."""
+    limits = problem.limits.model_copy(update={"snap": None})
+    states = {which: _without_jerk(getattr(problem.move, which)) for which in ("start", "end")}
+    easier = problem.model_copy(update={"limits": limits, "move": problem.move.model_copy(update=states)})
+    chain = as_chain(easier) if problem.order == 4 else None
+    try:
+        return None if chain is None else shortest(chain).duration
+    except (Impossible, Unresolved):
+        return None
+
+
+def _without_jerk(state: State) -> State:
+    return state.model_copy(update={"jerk": None})
 
 
 def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from trajopt.switching.chain import Arcs, Chain, Unresolved
+from trajopt.switching.chain import NAMES, Arcs, Chain, Unresolved
 from trajopt.switching.doomed import refuse_doomed
 from trajopt.switching.general import shortest_general
 from trajopt.switching.low import OutOfRange, shortest_low
@@ -36,7 +36,7 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
         except OutOfRange:
             return shortest_general(chain, 0.0, None)
     if not chain.at_rest:
-        return shortest_general(chain, min_dwell, touches)
+        return _either_way(chain, min_dwell, touches)
     arcs = between_rests(chain, min_dwell, touches)
     if arcs.loss > _OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
         with suppress(Unresolved):
@@ -45,3 +45,29 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
                 lowest = min(max(arcs.lowest, other.lowest), other.duration)
                 return replace(other, lowest=lowest, ordinary=arcs.ordinary)
     return arcs
+
+
+def _either_way(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
+    """Forwards in time, or where no structure is found, backwards."""
+    try:
+        return shortest_general(chain, min_dwell, touches)
+    except Unresolved:
+        return run_backwards(shortest_general(chain.reversed(), min_dwell, touches), chain.order)
+
+
+def run_backwards(arcs: Arcs, order: int) -> Arcs:
+    """The arcs of a chain from those of the one that runs backwards in time: odd derivatives turn their sign."""
+
+    def turned(name: str) -> str:
+        quantity, _, side = name.partition(".")
+        other = {"max": "min", "min": "max"}[side]
+        return f"{quantity}.{other if NAMES.index(quantity) % 2 else side}"
+
+    sign = -1.0 if order % 2 else 1.0
+    return replace(
+        arcs,
+        durations=arcs.durations[::-1],
+        tops=tuple(sign * top for top in arcs.tops[::-1]),
+        active=tuple(map(turned, arcs.active[::-1])),
+        touches=tuple((arcs.duration - time, turned(name)) for time, name in arcs.touches[::-1]),
+    )
