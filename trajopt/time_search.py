@@ -65,14 +65,15 @@ def feasible_times(
     """The intervals of durations in which the move is possible, in order; the last may have no end (None).
 
     For ends that move, possible times need not be an up-set: past a short time in which the axis runs through, there
-    may be none until it can turn back. Scanned on a geometric grid and refined; slivers between grid points are missed,
-    but for those with a border known to be ``near`` (s). None are returned when the time limit cuts the scan short.
+    may be none until it can turn back. Sought on both sides of the borders known to be ``near`` (s), else scanned on a
+    geometric grid, where slivers between its points are missed. None are returned when the time limit cuts that short.
     """
     search = _Search(setting, clock)
     few = setting.problem.transcription.model_copy(update={"intervals": min(setting.mesh.intervals, 40)})
     coarse = _Search(Setting.of(setting.problem.model_copy(update={"transcription": few})), clock)
     grid = setting.sizes.duration * np.geomspace(0.1, 30.0, 72)
-    grid = np.unique([*grid, *(t * beside for t in near for beside in (0.98, 1.02))])
+    if near:
+        grid = np.unique([t * beside for t in near for beside in (0.98, 1.02)])
     try:
         inside = [coarse.margin(float(t)) >= 0 for t in grid]
         borders = [(a, b) for a, b, was, now in zip(grid, grid[1:], inside, inside[1:], strict=False) if was != now]
