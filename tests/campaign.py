@@ -1072,7 +1072,7 @@ class _Judge:
             and spec.distance
         ):
             self._closed_form(answer)
-        linear = all(term[1] in ("l1", "linf") for term in spec.terms)
+        linear = all(term[0] in (*DERIVATIVES, "force") and term[1] in ("l1", "linf") for term in spec.terms)
         if linear and self.chance(0.2) and (own := program(spec)) is not None:
             best = own.least()
             size = max(abs(best), 1e-9)
