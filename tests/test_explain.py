@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import trajopt
+from tests.conftest import axis
 from trajopt.problem import Problem
 from trajopt.verdict import Verdict
 
@@ -132,3 +133,13 @@ def test_words_of_the_reference_case() -> None:
     text = " ".join(trajopt.solve(clemen_rupp('move.time="0.55 s"')).explanation["text"])
     for words in ("0.71859", "0.6599", "0.19901", "27.6", "no value of velocity.min or acceleration or jerk alone"):
         assert words in text
+
+
+def test_the_least_time_is_that_of_the_scheme_that_the_objective_asks_for() -> None:
+    """Without a jerk limit, minimum jerk has a mesh of constant jerk: its least time is longer than that of constant
+    accelerations, and that is the one that helps."""
+    problem = axis("jerk", "l2", time=1.0, limits={"velocity": 1.2, "acceleration": 3.0}, intervals=10)
+    explanation = trajopt.solve(problem).explanation
+    assert explanation["least_time_continuous"] < explanation["least_time"]
+    at_least = problem.move.model_copy(update={"time": explanation["least_time"]})
+    assert trajopt.solve(problem.replace(move=at_least)).status.solved

@@ -82,10 +82,10 @@ def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
     if problem.move.via or any(limit.varies for limit in problem.limits.given().values()) or _free_ends(problem):
         return {"least_time": None}
     move = problem.move.model_copy(update={"time": FREE})
-    timed = Objective(terms=(Term(minimize="time"),))
-    free = replace(setting, problem=problem.model_copy(update={"move": move, "objective": timed}))
+    free = replace(setting, problem=problem.model_copy(update={"move": move}))  # the objective decides the order
     free = replace(free, sizes=sizes_of(free.problem))
-    chain = as_chain(free.problem)
+    timed = Objective(terms=(Term(minimize="time"),))
+    chain = as_chain(free.problem.model_copy(update={"objective": timed}))
     found: dict[str, Any] = {"least_time_continuous": None if chain is None else _shortest(chain)}
     if problem.can_wait:
         attempt = minimum_time(free, clock)
