@@ -10,7 +10,9 @@ It bounds the discretised problem: no move on this mesh and scheme is better.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from scipy.sparse.linalg import splu
 
 Floats = NDArray[np.float64]
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
+_PAID: Final = 1e-9  # of the value: what inexact stationarity may take off a bound without being mended
+_WAYS: Final = ((1e-13, False), (1e-13, True), (1e-17, True))  # of restoring: ridge, and whether more moves than the multipliers of linear rows
 
 
 @dataclass(frozen=True)
@@ -45,13 +49,20 @@ def lower_bound(program: ConeProgram, x: Floats, z: Floats) -> float:
         return -np.inf
     reach = _reach(program, max(REACH, 10 * float(np.max(np.abs(x), initial=0.0))))
     z = _into_dual_cone(program, z)
-    gradient = program.P @ x + program.q
-    residual = gradient + program.A.T @ z
-    if reach @ np.abs(residual) > 1e-9 * abs(program.value(x)):
-        z = _restore_stationarity(program, z, gradient)
-        residual = gradient + program.A.T @ z
-    curvature = 0.5 * x @ (program.P @ x)
-    return float(-curvature - program.b @ z - reach @ np.abs(residual))
+    best, unpaid, enough = *_bound(program, x, z, reach), _PAID * abs(program.value(x))
+    for ridge, moving in _WAYS:
+        for y, w in _restored(program, x, z, ridge, moving) if not unpaid <= enough else ():
+            bound, unpaid = _bound(program, y, w, reach)
+            best = max(best, bound)
+            if unpaid <= enough:
+                break
+    return best
+
+
+def _bound(program: ConeProgram, x: Floats, z: Floats, reach: Floats) -> tuple[float, float]:
+    """The bound, and what inexact stationarity took off it."""
+    residual = float(reach @ np.abs(program.P @ x + program.q + program.A.T @ z))
+    return float(-0.5 * x @ (program.P @ x) - program.b @ z - residual), residual
 
 
 def is_infeasible(program: ConeProgram, z: Floats) -> bool:
@@ -60,10 +71,14 @@ def is_infeasible(program: ConeProgram, z: Floats) -> bool:
         return False
     z = _into_dual_cone(program, z / np.max(np.abs(z)))
     reach = _reach(program, REACH)
-    z = _restore_stationarity(program, z, np.zeros(len(program.q)))
-    residual = program.A.T @ z
+    nothing = np.zeros(len(program.q))
+    restored = _restored(replace(program, q=nothing), nothing, z, *_WAYS[0])
+    return any(_separates(program, w, reach) for w in (z, *(w for _, w in restored)))
+
+
+def _separates(program: ConeProgram, z: Floats, reach: Floats) -> bool:
     rounding = 1e-13 * float(np.abs(program.b) @ np.abs(z))
-    return bool(program.b @ z + reach @ np.abs(residual) < -rounding)
+    return bool(program.b @ z + reach @ np.abs(program.A.T @ z) < -rounding)
 
 
 def _reach(program: ConeProgram, otherwise: float) -> Floats:
@@ -95,29 +110,56 @@ def _into_dual_cone(program: ConeProgram, z: Floats) -> Floats:
     return z
 
 
-def _restore_stationarity(program: ConeProgram, z: Floats, gradient: Floats) -> Floats:
-    """z moved so that gradient + A'z nearly vanishes: the least change, weighted by the square of each multiplier, so
-    that small ones stay nonnegative, and with free equality multipliers. Cone multipliers stay as they are.
+def _restored(
+    program: ConeProgram, x: Floats, z: Floats, ridge: float, moving: bool
+) -> Iterator[tuple[Floats, Floats]]:
+    """x and z moved, again and again, so that Px + q + A'z nearly vanishes: multipliers by the least change, weighted
+    by the square of each, so that small ones stay nonnegative, and with free equality multipliers; if ``moving`` also
+    x, where the objective is curved, and the tails of cone multipliers, no longer than their heads.
 
-    The change is -W A y with (A'WA + ridge) y = gradient + A'z, solved in its sparse quasi-definite form: A'WA itself
-    is dense where one variable appears in all rows, as a peak does.
+    The change of z is W A dx with (P + A'WA + ridge) dx = -(Px + q + A'z), solved in its sparse quasi-definite form:
+    A'WA itself is dense where one variable appears in all rows, as a peak does.
     """
-    weight = np.concatenate([np.ones(program.zero), z[program.zero :] ** 2])
-    weight[program.zero + program.nonnegative :] = 0.0
+    weight = _weights(program, z, moving)
     rows = np.flatnonzero(weight > 1e-24 * max(float(weight.max(initial=0.0)), 1e-300))
     if not len(rows):
-        return z
-    A, n = program.A[rows], len(gradient)
-    ridge = 1e-13 * max(float(weight.max()), 1e-300)
-    K = sparse.block_array([[ridge * sparse.eye_array(n), A.T], [A, -sparse.diags_array(1 / weight[rows])]])
+        return
+    A, n = program.A[rows], len(x)
+    regular: Any = ridge * max(float(weight.max()), 1e-300) * sparse.eye_array(n)
+    if moving:
+        regular = regular + program.P
+    K = sparse.csc_array(sparse.block_array([[regular, A.T], [A, -sparse.diags_array(1 / weight[rows])]]))
     try:
-        factors = splu(
-            sparse.csc_array(K), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        factors = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError:  # nothing to factorise: the bound stays valid, only looser
-        return z
-    z, inequality = z.copy(), rows >= program.zero
+        return
     for _ in range(4):
-        step = factors.solve(np.concatenate([gradient + program.A.T @ z, np.zeros(len(rows))]))[n:]
-        z[rows] = np.where(inequality, np.maximum(z[rows] - step, 0.0), z[rows] - step)
+        right = -np.concatenate([program.P @ x + program.q + program.A.T @ z, np.zeros(len(rows))])
+        step = factors.solve(right)
+        step += factors.solve(right - K @ step)
+        x = x + step[:n] if moving else x
+        change = np.zeros(len(z))
+        change[rows] = step[n:]
+        z = _under_heads(program, z + change)
+        yield x, z
+
+
+def _weights(program: ConeProgram, z: Floats, tails: bool) -> Floats:
+    weight = np.concatenate([np.ones(program.zero), z[program.zero :] ** 2])
+    at = program.zero + program.nonnegative
+    for size in program.cones:
+        weight[at : at + size] = z[at] ** 2 if tails else 0.0
+        weight[at] = 0.0
+        at += size
+    return weight
+
+
+def _under_heads(program: ConeProgram, z: Floats) -> Floats:
+    """z, in place, with negative multipliers of inequalities zero, and the tails of cones no longer than their heads."""
+    at = program.zero + program.nonnegative
+    np.maximum(z[program.zero : at], 0.0, out=z[program.zero : at])
+    for size in program.cones:
+        tail = z[at + 1 : at + size]
+        tail *= min(1.0, z[at] / max(float(np.linalg.norm(tail)), 1e-300))
+        at += size
     return z

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from trajopt import checker
+from trajopt import checker, friction
 from trajopt.attempt import Attempt, Clock
 from trajopt.errors import InternalError
 from trajopt.explain import explain
@@ -87,10 +87,11 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
         since = perf_counter()
         move = problem.move.model_copy(update={"time": longest})
         longest_move = replace(setting, problem=problem.model_copy(update={"move": move}))
-        explanation = explain(without(longest_move, nonaffine_limits(problem)), clock)
+        tried = without(longest_move, nonaffine_limits(problem))
+        explanation = explain(tried, clock)
         if explanation["continuous"]:
             status = Verdict.IMPOSSIBLE
-        elif problem.load.coulomb and problem.limits.force is not None:
+        elif not friction.is_settled(tried, clock):
             status, explanation = Verdict.UNDECIDED, {}
         clock.charge("explain", since)
     if status is Verdict.UNDECIDED and clock.over:

@@ -94,6 +94,13 @@ def _largest(problem: Problem, name: str) -> float:
     return math.inf if limit is None else max(abs(limit.lowest), abs(limit.highest))
 
 
+def _largest_side(problem: Problem, name: str) -> float:
+    """Of the sides that a limit has: one alone makes a move from rest to rest take its time."""
+    limit = getattr(problem.limits, name)
+    sides = () if limit is None else (abs(limit.lowest), abs(limit.highest))
+    return max((side for side in sides if math.isfinite(side)), default=math.inf)
+
+
 def _stroke(problem: Problem, duration: float) -> float:
     """How far the axis goes, in m or rad: between given positions, or by the given velocities and accelerations."""
     positions = _given(problem, 0) + [problem.move.start_position or 0.0]
@@ -119,9 +126,9 @@ def _free_duration(problem: Problem) -> float:
         return 2 * velocity / acceleration if velocity and math.isfinite(acceleration) else 1.0
     factors = {"velocity": 1.0, "acceleration": 4.0, "jerk": 32.0, "snap": 512.0}
     times = [
-        (factor * stroke / _largest(problem, name)) ** (1 / i)
+        (factor * stroke / largest) ** (1 / i)
         for i, (name, factor) in enumerate(factors.items(), 1)
-        if math.isfinite(_largest(problem, name))
+        if math.isfinite(largest := _largest_side(problem, name)) and largest
     ]
     if problem.load.inertia is not None:
         mass = problem.load.inertia if isinstance(problem.load.inertia, float) else max(problem.load.inertia.value)
