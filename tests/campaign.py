@@ -4,6 +4,10 @@ A `Spec` is a problem in units of its own (a length, a time and a mass, all near
 `Spec.problem` builds it in SI units, which may be nanometres or thousands of kilometres. `judge` solves it and holds
 the answer against the checker, closed forms, the `ruckig` package, a linear program of its own (HiGHS, through scipy),
 and what must hold of any two related problems: other units, mirrored, run backwards, looser limits, more time.
+
+It solves in its own process: what runs it by the thousand ends a worker that dies or hangs. Explaining an impossible
+move takes several times as long as finding it so: `judge` may be told to leave that out, and with it the two solves
+that try a cure and a little less of it. A verdict needs no explanation, and the other guises of a spec get none.
 """
 
 from __future__ import annotations
@@ -18,12 +22,16 @@ from functools import cached_property
 from math import comb, factorial
 from time import perf_counter
 from typing import Any, Final
+from unittest.mock import patch
 
 import numpy as np
 from scipy.optimize import linprog
 
 import trajopt
-from trajopt import checker
+from trajopt import checker, conclude, solving
+from trajopt.attempt import Clock
+from trajopt.outer import is_impossible
+from trajopt.transcribe import Setting
 
 DERIVATIVES: Final = ("position", "velocity", "acceleration", "jerk", "snap")
 FREE: Final = "free"
@@ -870,9 +878,24 @@ class Record:
         self.failures.append(f"{kind}: {text}")
 
 
-def judge(spec: Spec, thorough: bool = False) -> Record:
-    """Solve a spec and hold the answer against all that is known; ``thorough``: every comparison, not a share."""
-    return _Judge(spec, thorough).run()
+def judge(spec: Spec, thorough: bool = False, explained: bool = True) -> Record:
+    """Solve a spec and hold the answer against all that is known; ``thorough``: every comparison, not a share;
+    ``explained``: where it is impossible, with an explanation, and one of its cures tried."""
+    return _Judge(spec, thorough, explained or thorough).run()
+
+
+def _unexplained(setting: Setting, clock: Clock) -> dict[str, Any]:
+    """What `trajopt.explain.explain` says of the verdict, and nothing else."""
+    duration = setting.problem.move.fixed_time
+    assert duration is not None
+    return {"continuous": is_impossible(setting, duration, clock), "text": ["impossible, and not explained"]}
+
+
+def _solved(problem: trajopt.Problem, explained: bool) -> trajopt.Solution:
+    if explained:
+        return solving.solve(problem, SECONDS)
+    with patch.object(conclude, "explain", _unexplained):
+        return solving.solve(problem, SECONDS)
 
 
 @dataclass(frozen=True)
@@ -897,9 +920,9 @@ class _Answer:
 
 
 class _Judge:
-    def __init__(self, spec: Spec, thorough: bool) -> None:
+    def __init__(self, spec: Spec, thorough: bool, explained: bool) -> None:
         self.spec, self.record = spec, Record(spec.seed)
-        self.rng, self.thorough = random.Random(spec.seed + 1_000_003), thorough
+        self.rng, self.thorough, self.explained = random.Random(spec.seed + 1_000_003), thorough, explained
 
     def chance(self, share: float) -> bool:
         return self.rng.random() < share or self.thorough
@@ -930,7 +953,7 @@ class _Judge:
             return None
         record.solves += 1
         try:
-            solution = trajopt.solve(problem, seconds=SECONDS)
+            solution = _solved(problem, self.explained and not guise)
         except trajopt.BadInput as error:
             return _Answer("REFUSED", math.nan, -math.inf, math.nan, {"message": str(error)})
         except Exception:
@@ -978,7 +1001,7 @@ class _Judge:
             self._guises(answer)
         if answer.status == "SOLVED":
             self._dearer(answer)
-        if answer.status.startswith("IMPOSSIBLE") and self.chance(0.1):
+        if answer.status.startswith("IMPOSSIBLE") and self.explained:
             self._cures(answer)
 
     def _impossible(self, answer: _Answer) -> None:

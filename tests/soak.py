@@ -1,7 +1,12 @@
 """The long random test: thousands of specs over processes, a table of verdicts, and every failure by its seed.
 
 python -m tests.soak --specs 20000 --seed 1 --workers 2
+python -m tests.soak --seeds 1000000:1020000  the same specs
 python -m tests.soak --seeds 17 --show        one spec again, and what was made of it
+
+Every record is written to a journal as it comes, one JSON line each. The same command goes on where a run was stopped,
+by Ctrl-C, SIGTERM or ``--seconds``, and its summary counts every spec ever judged; ``--afresh`` forgets them.
+Of the impossible moves every fifth is explained, and a cure of it tried: see `tests.campaign`.
 """
 
 from __future__ import annotations
@@ -14,10 +19,11 @@ import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,33 +40,86 @@ PLANTS: Final = 300
 CHAINS: Final = 200_000
 _BATCH: Final = 500  # chains a task
 MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
-PATIENCE: Final = 600.0  # s without any answer: the workers hang
+PATIENCE: Final = 600.0  # s for one spec and those that wait before it: beyond, its worker hangs
+_LOOK: Final = 60.0  # s between looks for one that hangs
+EXPLAINED: Final = 5  # of so many impossible moves, one
 _RECYCLE: Final = 400  # specs a worker judges: solvers leak
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the campaign; 1 when anything is fatal."""
+    """Run the campaign; 1 when anything is fatal, 130 when it was stopped."""
     options = _options(arguments)
     seeds = options.seeds or range(options.seed * 1_000_000, options.seed * 1_000_000 + options.specs)
     console = Console(stderr=True)
-    since = time.monotonic()
     if options.show:
-        records = [_shown(seed, console, options.shrink) for seed in seeds]
-    else:
-        records = list(_watched(_run(seeds, options.workers, since + options.seconds), len(seeds), console))
-    summary = summarise(records, time.monotonic() - since)
-    if not options.show and not options.seeds:
+        shown = [_shown(seed, console, options.shrink) for seed in seeds]
+        summary = summarise(shown, sum(record.seconds for record in shown))
+        _print(summary, console)
+        return int(_is_wrong(summary))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    journal = Journal(STORE / f"{min(seeds)}_{max(seeds) + 1}.jsonl", options.afresh)
+    stopped = _judge_all(seeds, options, journal, console)
+    summary = summarise([r for r in journal.records if r.seed in set(seeds)], journal.seconds)
+    if not options.seeds and not stopped and summary["specs"] == len(seeds):
         summary["plants"] = _stage(test_plant_random.fault, options.plants, options.workers)
         batches = -(-options.chains // _BATCH)
         summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
     _print(summary, console)
-    if not options.show:
-        STORE.mkdir(exist_ok=True)
-        path = STORE / f"seed{options.seed}_{len(records)}.json"
-        path.write_text(json.dumps(summary, indent=1))
-        console.print(f"written: {path}")
+    path = journal.path.with_suffix(".json")
+    path.write_text(json.dumps(summary, indent=1))
+    console.print(f"written: {path}")
+    return 130 if stopped else int(_is_wrong(summary))
+
+
+def _is_wrong(summary: dict[str, Any]) -> bool:
     faults = any(summary.get(stage, {}).get("faults") for stage in ("plants", "chains"))
-    return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or faults)
+    return summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or faults
+
+
+class Journal:
+    """The records of a range of seeds, kept in a file of JSON lines; a run that ends leaves a line with its seconds."""
+
+    def __init__(self, path: Path, afresh: bool = False) -> None:
+        path.parent.mkdir(exist_ok=True)
+        if afresh:
+            path.unlink(missing_ok=True)
+        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+        found = [json.loads(line) for line in lines if line.endswith("\n")]  # a run that was killed may leave half of one
+        self.path = path
+        self.records = [Record(**x) for x in found if "seed" in x]
+        self.seconds = float(sum(x["ran"] for x in found if "ran" in x))
+        self._file = path.open("a")
+        if lines and not lines[-1].endswith("\n"):
+            self._file.write("\n")
+
+    def add(self, record: Record) -> None:
+        """Keep a record."""
+        self.records.append(record)
+        self._write(asdict(record))
+
+    def ran(self, seconds: float) -> None:
+        """Keep how long a run took."""
+        self.seconds += seconds
+        self._write({"ran": seconds})
+
+    def _write(self, line: dict[str, Any]) -> None:
+        self._file.write(json.dumps(line) + "\n")
+        self._file.flush()
+
+
+def _judge_all(seeds: Sequence[int], options: argparse.Namespace, journal: Journal, console: Console) -> bool:
+    """Judge the seeds that the journal lacks; whether that was stopped by a signal."""
+    since = time.monotonic()
+    done = {record.seed for record in journal.records}
+    left = [seed for seed in seeds if seed not in done]
+    try:
+        for record in _watched(_run(left, options.workers, since + options.seconds), len(left), console):
+            journal.add(record)
+    except KeyboardInterrupt:
+        return True
+    finally:
+        journal.ran(time.monotonic() - since)
+    return False
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
@@ -73,12 +132,20 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
     parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
     parser.add_argument("--chains", type=int, default=CHAINS, help="how many least times against Ruckig's (200000)")
-    parser.add_argument("--seeds", type=int, nargs="+", help="only the specs of these seeds")
+    parser.add_argument("--seeds", nargs="+", default=[], help="only the specs of these seeds, or of FROM:TO")
+    parser.add_argument("--afresh", action="store_true", help="judge again what the journal has")
     parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
     parser.add_argument(
         "--shrink", action="store_true", help="with --show: simplify what fails as far as it still does"
     )
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    options.seeds = [seed for text in options.seeds for seed in _span(text)]
+    return options
+
+
+def _span(text: str) -> range:
+    first, colon, end = text.partition(":")
+    return range(int(first), int(end) if colon else int(first) + 1)
 
 
 def _stage(fault: Callable[[int], str], count: int, workers: int) -> dict[str, Any]:
@@ -100,11 +167,12 @@ def _outcome(future: Future[str]) -> str:
 
 def work(seed: int) -> Record:
     """Draw and judge one spec, in a worker."""
-    return judge(draw(seed))
+    return judge(draw(seed), explained=seed % EXPLAINED == 0)
 
 
 def _quiet() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    for interrupt in (signal.SIGINT, signal.SIGTERM):  # the parent decides
+        signal.signal(interrupt, signal.SIG_IGN)
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
@@ -118,29 +186,27 @@ def _run(seeds: Iterable[int], workers: int, deadline: float) -> Iterator[Record
     """The records as they come. Specs in flight when a worker dies are judged again, each in a process of its own."""
     waiting, suspects = iter(seeds), []
     pool = _pool(workers)
-    flying: dict[Future[Record], int] = {}
+    flying: dict[Future[Record], tuple[int, float]] = {}  # seed, and since when
     try:
         while True:
-            while (
-                len(flying) < 3 * workers and time.monotonic() < deadline and (seed := next(waiting, None)) is not None
-            ):
-                flying[pool.submit(work, seed)] = seed
+            room = 3 * workers - len(flying) if time.monotonic() < deadline else 0
+            for seed in islice(waiting, room):
+                flying[pool.submit(work, seed)] = seed, time.monotonic()
             if not flying:
                 break
-            done, _ = wait(flying, timeout=PATIENCE, return_when=FIRST_COMPLETED)
+            done, _ = wait(flying, timeout=_LOOK, return_when=FIRST_COMPLETED)
             try:
-                if not done:
-                    raise BrokenProcessPool("no answer")
                 for future in done:
                     record = future.result()
                     del flying[future]
                     yield record
+                if any(since < time.monotonic() - PATIENCE for _, since in flying.values()):
+                    raise BrokenProcessPool("no answer")
             except BrokenProcessPool:
-                suspects += flying.values()
+                suspects += [seed for seed, _ in flying.values()]
                 flying = {}
                 _end(pool)
                 pool = _pool(workers)
-        pool.shutdown()
     finally:
         _end(pool)
     for seed in suspects:

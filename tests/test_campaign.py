@@ -104,7 +104,7 @@ def test_the_judge_catches_planted_lies(monkeypatch: pytest.MonkeyPatch) -> None
     true = trajopt.solve(spec.problem())
 
     def judged(**lie: Any) -> str:
-        monkeypatch.setattr(trajopt, "solve", lambda *_, **__: dataclasses.replace(true, **lie))
+        monkeypatch.setattr(campaign.solving, "solve", lambda *_, **__: dataclasses.replace(true, **lie))
         record = judge(spec)
         monkeypatch.undo()
         return " ".join(failure.partition(":")[0] for failure in record.failures)

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 Floats = NDArray[np.float64]
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
 _PAID: Final = 1e-9  # of the value: what inexact stationarity may take off a bound without being mended
-_WAYS: Final = ((1e-13, False), (1e-13, True), (1e-17, True))  # of restoring: ridge, and whether more moves than the multipliers of linear rows
+_WAYS: Final = ((1e-13, False), (1e-13, True), (1e-17, True))  # see `_restored`: ridge, and whether all is moving
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _weights(program: ConeProgram, z: Floats, tails: bool) -> Floats:
 
 
 def _under_heads(program: ConeProgram, z: Floats) -> Floats:
-    """z, in place, with negative multipliers of inequalities zero, and the tails of cones no longer than their heads."""
+    """z, in place, with no negative multipliers of inequalities, and tails of cones no longer than their heads."""
     at = program.zero + program.nonnegative
     np.maximum(z[program.zero : at], 0.0, out=z[program.zero : at])
     for size in program.cones:
