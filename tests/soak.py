@@ -84,7 +84,7 @@ class Journal:
         if afresh:
             path.unlink(missing_ok=True)
         lines = path.read_text().splitlines(keepends=True) if path.exists() else []
-        found = [json.loads(line) for line in lines if line.endswith("\n")]  # a run that was killed may leave half of one
+        found = [json.loads(line) for line in lines if line.endswith("\n")]  # else a killed run left it so
         self.path = path
         self.records = [Record(**x) for x in found if "seed" in x]
         self.seconds = float(sum(x["ran"] for x in found if "ran" in x))

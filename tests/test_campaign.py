@@ -123,3 +123,27 @@ def test_the_judge_catches_planted_lies(monkeypatch: pytest.MonkeyPatch) -> None
     top = [*true.trajectory.chain[:-1], np.roll(true.trajectory.chain[-1], 1)]  # type: ignore[union-attr]
     assert "checker" in judged(trajectory=dataclasses.replace(true.trajectory, chain=tuple(top)))  # type: ignore[type-var]
     assert math.isfinite(true.objective or math.nan)
+
+
+def test_a_soak_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
+    path = tmp_path / "1_4.jsonl"
+    first = soak.Journal(path)
+    first.add(campaign.Record(1, "SOLVED", counts=["not strict"]))
+    first.ran(2.0)
+    with path.open("a") as file:
+        file.write('{"seed": 2, "sta')  # killed while it wrote
+    again = soak.Journal(path)
+    again.add(campaign.Record(3, "UNDECIDED", failures=["gap: too wide"]))
+    last = soak.Journal(path)
+    assert [record.seed for record in last.records] == [1, 3]
+    assert soak.summarise(last.records, last.seconds)["failures"][0]["seed"] == 3
+    assert last.seconds == 2.0
+    assert not soak.Journal(path, afresh=True).records
+
+
+def test_an_impossible_move_may_go_unexplained() -> None:
+    spec = Spec(limits={"velocity": [-0.5, 0.5], "jerk": [-30.0, 30.0]}, duration=1.5, intervals=12)
+    records = [judge(spec, explained=explained) for explained in (True, False)]
+    assert [record.status for record in records] == ["IMPOSSIBLE", "IMPOSSIBLE"]
+    assert not any(record.failures for record in records)
+    assert records[1].solves < records[0].solves

@@ -134,6 +134,14 @@ def test_an_infeasible_program_is_proved_so_by_its_ray(gap: float) -> None:
     assert not is_infeasible(program, -ray)
 
 
+def test_stationarity_is_restored_where_the_objective_is_curved() -> None:
+    """The least of |x|²/2 with x1 + ... + x8 = 1: one multiplier cannot make up for eight values that are off."""
+    n = 8
+    program = ConeProgram(sparse.csc_array(np.eye(n)), np.zeros(n), sparse.csc_array(np.ones((1, n))), np.ones(1), 1, 0)
+    x = 1 / n + 1e-6 * np.random.default_rng(3).normal(size=n)
+    assert lower_bound(program, x, np.array([-1 / n])) == pytest.approx(1 / (2 * n), rel=1e-9)
+
+
 def test_a_feasible_program_is_not_proved_infeasible_by_the_same_ray() -> None:
     for gap in (-1.0, -1e-6):
         program, ray = contradiction(gap)

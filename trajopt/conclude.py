@@ -38,7 +38,7 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
     value = trajectory.measure(problem.objective)
     if "held" in attempt.notes:  # the optimum itself, which the smoother profile holds within that share
         value = attempt.value
-    certificate = _certificate(value, attempt)
+    certificate = _certificate(setting, value, attempt)
     verdict = Verdict.SOLVED if certificate["gap"] is not None and certificate["gap"] <= GAP else Verdict.SOLVED_LOCAL
     found = metrics(trajectory)
     candidate = Solution(
@@ -104,7 +104,7 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
     return Solution(status, problem, chosen, explanation=explanation, timings=clock.timings(), message=message)
 
 
-def _certificate(value: float, attempt: Attempt) -> dict[str, Any]:
+def _certificate(setting: Setting, value: float, attempt: Attempt) -> dict[str, Any]:
     """Lower bound, gap and what the bound is about; for a local optimum also how many starts agreed on it.
 
     Raises InternalError when the bound lies above the answer.
@@ -118,5 +118,5 @@ def _certificate(value: float, attempt: Attempt) -> dict[str, Any]:
         raise InternalError(f"lower bound {bound!r} above the answer {value!r}")
     between = attempt.trajectory is not None and attempt.trajectory.scheme.terms > 1
     about = "every move on this mesh" + (" whose Bernstein coefficients keep the limits" if between else "")
-    about = attempt.notes.get("bounds", about)
+    about = attempt.notes.get("bounds", about) + ", friction at rest as in motion" * friction.is_charged(setting)
     return {"lower_bound": min(bound, value), "gap": max(gap, 0.0), "bounds": about, **starts}

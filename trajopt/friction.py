@@ -7,6 +7,7 @@ allows. At rest the real one takes any value up to it, so a program may refuse a
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 from trajopt.attempt import Clock, convex, smoothest, to
 from trajopt.fields import Limit
@@ -16,7 +17,7 @@ from trajopt.problem import Problem
 from trajopt.quantities import FORCES
 from trajopt.transcribe import Setting, without
 
-_TOTALS = ("rms_force", "copper_loss", "brake_energy")  # which charge the friction of every pause
+_TOTALS: Final = ("rms_force", "brake_energy")  # limits to which every pause adds its friction
 
 
 def is_settled(setting: Setting, clock: Clock) -> bool:
@@ -27,7 +28,7 @@ def is_settled(setting: Setting, clock: Clock) -> bool:
     the Euler scheme, at rest for an instant only, it is tried again with limits that no pause can break.
     """
     problem = setting.problem
-    loaded = [name for name in (*FORCES, "brake_energy") if getattr(problem.limits, name, None) is not None]
+    loaded = _loaded(problem)
     if not problem.load.coulomb or not loaded or _allows_crawling(setting):
         return True
     force = problem.limits.force
@@ -38,6 +39,22 @@ def is_settled(setting: Setting, clock: Clock) -> bool:
     duration = problem.move.fixed_time
     assert duration is not None
     return convex(lenient, duration, to(smoothest(problem)), clock).outcome.claim is Claim.INFEASIBLE
+
+
+def is_charged(setting: Setting) -> bool:
+    """Whether a bound counts friction at rest as in motion: no bound on moves that pause, where it is held for less."""
+    problem = setting.problem
+    velocity = problem.limits.velocity
+    pauses = velocity is not None and problem.one_way != 0 and velocity.lowest <= 0 <= velocity.highest
+    if not problem.load.coulomb or not pauses:
+        return False
+    minimised = {term.minimize for term in problem.objective.terms} & {*FORCES, "electrical_energy"}
+    return bool(minimised) or (bool(_loaded(problem)) and not _allows_crawling(setting))
+
+
+def _loaded(problem: Problem) -> list[str]:
+    """The limits that friction counts for."""
+    return [name for name in (*FORCES, "brake_energy") if getattr(problem.limits, name, None) is not None]
 
 
 def _allows_crawling(setting: Setting) -> bool:
