@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, Final
 
@@ -83,11 +83,11 @@ def convex(
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
-    from trajopt.model_cvxpy import LADDER, RESCUE, ConvexModel
+    from trajopt.model_cvxpy import LADDER, RESCUES, ConvexModel
 
     best: Attempt | None = None
     for rung in LADDER if solver == "clarabel" else (solver,):
-        if rung == RESCUE and best is not None and best.gap <= 1e-6:
+        if rung in RESCUES and best is not None and best.gap <= 1e-6:
             break
         since = perf_counter()
         model = ConvexModel()
@@ -100,10 +100,13 @@ def convex(
         outcome = model.run(rung, clock.left())
         clock.charge("solve", since)
         attempt = _read(setting, transcript, lowered, outcome)
-        if attempt.gap <= ENOUGH or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
+        again = best is not None and outcome.claim is best.outcome.claim  # one rung alone may be wrong about it
+        if attempt.gap <= ENOUGH or outcome.claim is Claim.INFEASIBLE or (outcome.claim is Claim.UNBOUNDED and again):
             return attempt
+        bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
             best = attempt
+        best = replace(best, bound=bound)
         if clock.over:
             break
     assert best is not None

@@ -21,11 +21,12 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "clarabel": _CLARABEL | {"static_regularization_constant": 1e-10},
     "clarabel-firm": _CLARABEL | {"static_regularization_constant": 1e-8},
     "clarabel-soft": _CLARABEL | {"static_regularization_constant": 1e-7},
+    "clarabel-faer": _CLARABEL | {"static_regularization_constant": 1e-10, "direct_solve_method": "faer"},
     "osqp-last": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 10_000, "polishing": True},
     "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 200_000, "polishing": True},
 }
-RESCUE: Final = "osqp-last"  # slow, and not for cones: only where nothing else came near
-LADDER: Final = ("clarabel", "clarabel-firm", "clarabel-soft", RESCUE)
+RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, and not for cones: where none came near
+LADDER: Final = ("clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
 
 
 class ConvexModel:

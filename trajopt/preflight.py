@@ -85,16 +85,26 @@ def _time(problem: Problem) -> None:
         raise ValueError('move.time: "free" needs a time term in the objective, or a range such as ["0.5 s", "2 s"]')
     if fixed:
         return
-    if problem.move.time == "free" and not any(name != "position" for name in problem.limits.given()):
-        only = len(problem.objective.terms) == 1
-        if only:
+    if problem.move.time == "free" and len(problem.objective.terms) == 1:
+        if not (limited := set(problem.limits.given()) - {"position"}):
             raise ValueError('limits: nothing bounds the move: least time needs one such as acceleration = "5 m/s^2"')
+        if limited == {"velocity"} and (side := _unbounded_side(problem)):
+            remedy = 'give it, or a limit such as acceleration = "5 m/s^2"'
+            raise ValueError(f"limits.velocity.{side}: is missing, and the least time is 0 s without it; {remedy}")
     if problem.move.time == "free" and _stays(problem):
         raise ValueError("move.end: the move ends in the state in which it starts: it takes no time; give move.time")
     if any(limit.varies for limit in problem.limits.given().values()) or problem.move.via:
         raise ValueError('move.time: limits by time and via states need a fixed move.time such as "1 s"')
     if problem.load.inertia is not None and not isinstance(problem.load.inertia, float):
         raise ValueError('move.time: an inertia that varies in time needs a fixed move.time such as "1 s"')
+
+
+def _unbounded_side(problem: Problem) -> str:
+    """The side of the velocity limit, missing, towards which the end lies; none of free ends."""
+    velocity, start, end = problem.limits.velocity, problem.move.start_position, problem.move.end.position
+    if velocity is None or start is None or not isinstance(end, float):
+        return ""
+    return "max" if end > start and velocity.max is None else "min" if end < start and velocity.min is None else ""
 
 
 def _stays(problem: Problem) -> bool:
