@@ -84,13 +84,14 @@ class Journal:
         if afresh:
             path.unlink(missing_ok=True)
         lines = path.read_text().splitlines(keepends=True) if path.exists() else []
-        found = [json.loads(line) for line in lines if line.endswith("\n")]  # else a killed run left it so
+        if lines and not lines[-1].endswith("\n"):  # a killed run left it so
+            path.write_text("".join(lines[:-1]))
+            lines.pop()
+        found = [json.loads(line) for line in lines]
         self.path = path
         self.records = [Record(**x) for x in found if "seed" in x]
         self.seconds = float(sum(x["ran"] for x in found if "ran" in x))
         self._file = path.open("a")
-        if lines and not lines[-1].endswith("\n"):
-            self._file.write("\n")
 
     def add(self, record: Record) -> None:
         """Keep a record."""

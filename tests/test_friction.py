@@ -28,7 +28,7 @@ def test_limits_that_allow_a_crawl_settle_it_without_another_program() -> None:
     assert not clock.spent
 
 
-@pytest.mark.parametrize(("distance", "settled"), [(0.03, True), (0.1, False), (0.3, True)])
+@pytest.mark.parametrize(("distance", "settled"), [(0.03, True), (0.1, False), (1.2, True)])
 def test_a_motor_too_weak_to_crawl_is_judged_by_what_no_pause_can_break(distance: float, settled: bool) -> None:
     assert is_settled(coasting(distance), Clock()) is settled
 
