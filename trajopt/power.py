@@ -5,9 +5,10 @@ gives the power at the nodes exactly as m a_k v_k = m (w_k² - w_(k-1)²)/(2h). 
 place of the squares, anchored at the prescribed ends, and below the chord of what w_k can reach: q_k <= top_k w_k/2.
 Power is then affine, and the optimum a lower bound for every move on the mesh. Where acceleration is constant on
 intervals, squares of the velocity at the nodes do the same for the mean of the power at both ends of an interval,
-m (v_(k+1)² - v_k²)/(2h): norms of it are at most those of the power, by convexity. Losses of a motor that are convex
-in force add to it; those that are not are left out. From the answer of the relaxation, programs with the power
-linearised at the last one descend to a local optimum: every point between two feasible moves is feasible.
+m (v_(k+1)² - v_k²)/(2h), from which the ends themselves lie m h a_k²/2 off to either side: b_k >= m h a_k²/2 stands for
+that. Losses of a motor that are convex in force add to it; those that are not are left out. From the answer of the
+relaxation, programs with the power linearised at the last one descend to a local optimum: every point between two
+feasible moves is feasible.
 """
 
 from __future__ import annotations
@@ -136,34 +137,63 @@ class Lifted(Quantities):
     def _power(self) -> Signal:
         kept = getattr(self.model, "lifted_power", None)
         if kept is None:
-            known = self._nodes() if self.problem.order == 3 else self._means()
+            known = self._nodes() if self.problem.order == 3 else self._ends()
             kept = self.model.lifted_power = known
         return kept
 
     def _electrical_power(self) -> Signal:
         model, load = self.model, self.problem.load
         heats = [motor.heat(model, load, u, self.sizes.current) for (u,) in self.ends("current")]
-        heat = sum(heats[1:], heats[0]) * (1 / len(heats))
         mechanical = self._power()
-        if mechanical.nodes is not None:
-            return Signal(heat + mechanical.nodes, ())
-        return Signal(None, (heat + mechanical.pieces[0],))
+        if mechanical.degree == 0:  # the mean of both ends alone is known
+            return Signal(None, (sum(heats[1:], heats[0]) * (1 / len(heats)) + mechanical.pieces[0],))
+        powers = mechanical.ends(mechanical.nodes is not None)
+        return signals.sampled([heat + power for heat, power in zip(heats, powers, strict=True)])
 
-    def _means(self) -> Signal:
-        """The mean of the power at both ends of every interval, affine in the chain and the lifted squares."""
-        load, way, model = self.problem.load, self.problem.one_way, self.model
-        mass, step, last = load.inertia, float(self.steps[0]), self.mesh.intervals
+    def _ends(self) -> Signal:
+        """Power at both ends of every interval, affine in the chain, the lifted squares and the spread b; or the mean
+        of both, where no more is asked for."""
+        way, model, mass, step = self.problem.one_way, self.model, self.problem.load.inertia, float(self.steps[0])
         velocity = self.signal("velocity").nodes
-        ends = {(node, i): x for node, i, x in prescribed(self.problem, self.mesh)}
+        states = {(node, i): x for node, i, x in prescribed(self.problem, self.mesh)}
+        ends = states[0, 1], states[self.mesh.intervals, 1]
         assert isinstance(mass, float)
-        squares = self._squares(way * velocity, _node_reach(self, step), (ends[0, 1], ends[last, 1]), self.reach)
+        squares = self._squares(way * velocity, _node_reach(self, step), ends, self.reach)
         model.lifted_squares = (way * velocity, squares)
-        power = model.times(mass / step, squares[1:] - squares[:-1])
+        mean = model.times(mass / step, squares[1:] - squares[:-1])
+        friction = self._friction(velocity, squares)
+        if not self._is_felt():
+            return Signal(None, (mean + (friction[:-1] + friction[1:]) * 0.5,))
+        spread = self._spread(mass / step, squares, ends)
+        return Signal(None, (mean - spread + friction[:-1], mean + spread + friction[1:]))
+
+    def _is_felt(self) -> bool:
+        """Whether power matters at an instant; an integral of it feels the mean alone, but where its sign turns."""
+        limited = self.problem.limits.power is not None
+        return limited or any(term.minimize == "power" for term in self.problem.objective.terms)
+
+    def _spread(self, factor: float, squares: Any, ends: tuple[float, float]) -> Any:
+        """(N,) variables from m h a²/2 upwards, half the change of power over an interval; ``factor``: m/h. On one from
+        or to rest they are at least the power at its other end, halved."""
+        model, sizes, count = self.model, self.sizes.derivative, self.mesh.intervals
+        spread = model.vector(count, 1.0, np.zeros(count), np.full(count, np.inf))
+        model.nonpositive(model.squares(self.chain[2] * (1 / sizes[2])) - spread)
+        spread = model.times(factor * float(self.steps[0]) ** 2 / 2 * sizes[2] ** 2, spread)
+        beside = (squares[1:2], spread[:1]), (squares[-2:-1], spread[-1:])
+        for velocity, (there, here) in zip(ends, beside, strict=True):
+            if velocity == 0:
+                model.nonpositive(factor * there - here, factor * sizes[1] ** 2)
+        return spread
+
+    def _friction(self, velocity: Any, squares: Any) -> Any:
+        """(N+1,) the power of friction, from the velocity and its lifted squares."""
+        load, model = self.problem.load, self.model
+        power: Any = np.zeros(self.mesh.intervals + 1)
         if load.viscous:
-            power = power + model.times(load.viscous, squares[1:] + squares[:-1])
+            power = power + model.times(2 * load.viscous, squares)
         if load.coulomb:
-            power = power + model.times(way * load.coulomb / 2, velocity[1:] + velocity[:-1])
-        return Signal(None, (power,))
+            power = power + model.times(self.problem.one_way * load.coulomb, velocity)
+        return power
 
     def _nodes(self) -> Signal:
         """Power at the nodes, affine in the chain and the lifted squares."""
@@ -177,12 +207,10 @@ class Lifted(Quantities):
         model.lifted_squares = (way * velocity.pieces[1], squares)
         first, final = (np.array([mass * ends[k, 1] * ends[k, 2]]) for k in (0, last))
         power = model.concatenate([first, model.times(mass / step, squares[1:] - squares[:-1]), final])
+        nodes: Any = None
         if load.viscous:
             nodes = self._squares(way * velocity.nodes, _node_reach(self, step), (ends[0, 1], ends[last, 1]))
-            power = power + model.times(2 * load.viscous, nodes)
-        if load.coulomb:
-            power = power + model.times(way * load.coulomb, velocity.nodes)
-        return Signal(power, ())
+        return Signal(power + self._friction(velocity.nodes, nodes), ())
 
     def _squares(
         self, speed: Any, top: Floats, ends: tuple[float, float], reach: tuple[Floats, Floats] | None = None
