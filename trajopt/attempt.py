@@ -14,6 +14,7 @@ from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Objective, Problem, Term
 from trajopt.rebuild import rebuild
+from trajopt.scaling import resized
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, transcribe
 
@@ -78,7 +79,8 @@ def convex(
     widen_size: float = 1.0,
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
-    run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate.
+    run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate; each rung has the sizes of
+    the best move so far.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
@@ -109,6 +111,8 @@ def convex(
         best = replace(best, bound=bound)
         if clock.over:
             break
+        if best.trajectory is not None:  # as large as the move is, not as it could be
+            setting = replace(setting, sizes=resized(setting.sizes, setting.problem, best.trajectory.chain))
     assert best is not None
     return best
 
@@ -158,9 +162,9 @@ def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) 
         from trajopt.model_pyomo import NonconvexModel
 
         model = NonconvexModel()
-    transcript = transcribe(setting, model, duration)
+    assert attempt.outcome.pair is not None and attempt.trajectory is not None
+    transcript = transcribe(replace(setting, sizes=attempt.trajectory.sizes), model, duration)
     model.minimize(goal(transcript).expression)
-    assert attempt.outcome.pair is not None
     return float(model.lagrangian(attempt.outcome.pair))
 
 

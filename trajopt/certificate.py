@@ -121,11 +121,12 @@ def _restored(
     A'WA itself is dense where one variable appears in all rows, as a peak does.
     """
     weight = _weights(program, z, moving)
-    rows = np.flatnonzero(weight > 1e-24 * max(float(weight.max(initial=0.0)), 1e-300))
+    rows = np.flatnonzero(weight > 1e-30 * max(float(weight.max(initial=0.0)), 1e-270))
     if not len(rows):
         return
     A, n = program.A[rows], len(x)
-    regular: Any = ridge * max(float(weight.max()), 1e-300) * sparse.eye_array(n)
+    own = A.power(2).T @ weight[rows]  # the diagonal of A'WA: each variable has its own size
+    regular: Any = ridge * sparse.diags_array(np.where(own > 0, own, 1.0))
     if moving:
         regular = regular + program.P
     K = sparse.csc_array(sparse.block_array([[regular, A.T], [A, -sparse.diags_array(1 / weight[rows])]]))
@@ -149,7 +150,6 @@ def _weights(program: ConeProgram, z: Floats, tails: bool) -> Floats:
     at = program.zero + program.nonnegative
     for size in program.cones:
         weight[at : at + size] = z[at] ** 2 if tails else 0.0
-        weight[at] = 0.0
         at += size
     return weight
 

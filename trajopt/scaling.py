@@ -7,7 +7,11 @@ infeasible. With these sizes metres, nanometres and kilometres give the same pro
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from trajopt.motor import available_force
 from trajopt.problem import DERIVATIVES, Load, Problem
@@ -65,11 +69,21 @@ def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
         limit = min(_largest(problem, DERIVATIVES[k]) * duration ** (k - i) for k in range(i, order + 1))
         reach = min(limit, factor * stroke / duration**i)
         derivative.append(max(reach, *(abs(x) for x in _given(problem, i)), 1e-9 * min(limit, stroke / duration**i)))
-    inertia = problem.load.inertia
+    return _of_chain(problem.load, tuple(derivative), duration)
+
+
+def resized(sizes: Sizes, problem: Problem, chain: Sequence[Any]) -> Sizes:
+    """The sizes that a move really has, from the derivatives found: where it stays far below what it can reach."""
+    peaks = (float(np.max(np.abs(x))) for x in chain)
+    derivative = tuple(max(peak, 1e-6 * size) for peak, size in zip(peaks, sizes.derivative, strict=True))
+    return _of_chain(problem.load, derivative, sizes.duration)
+
+
+def _of_chain(load: Load, derivative: tuple[float, ...], duration: float) -> Sizes:
+    inertia = load.inertia
     mass = 0.0 if inertia is None else inertia if isinstance(inertia, float) else max(inertia.value)
-    load = problem.load
     force = mass * derivative[2] + load.viscous * derivative[1] + load.coulomb
-    return _with_motor(load, Sizes(tuple(derivative), duration, force or 1.0))
+    return _with_motor(load, Sizes(derivative, duration, force or 1.0))
 
 
 def _with_motor(load: Load, sizes: Sizes) -> Sizes:
