@@ -7,15 +7,17 @@ allows. At rest the real one takes any value up to it, so a program may refuse a
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from trajopt.attempt import Clock, convex, smoothest, to
-from trajopt.fields import Limit
 from trajopt.model import Claim
 from trajopt.motor import available_force
 from trajopt.problem import Problem
-from trajopt.quantities import FORCES
-from trajopt.transcribe import Setting, without
+from trajopt.quantities import FORCES, Quantities
+from trajopt.signals import Signal
+from trajopt.transcribe import Setting
 
 _TOTALS: Final = ("rms_force", "brake_energy")  # limits to which every pause adds its friction
 
@@ -25,20 +27,39 @@ def is_settled(setting: Setting, clock: Clock) -> bool:
 
     An axis that moves one way rests without acceleration, and then the program asks of its limits what it asks in a
     crawl. Where they allow a crawl, the program asks nothing that the move does not. Elsewhere, and for the nodes of
-    the Euler scheme, at rest for an instant only, it is tried again with limits that no pause can break.
+    the Euler scheme, at rest for an instant only, it is tried again with less friction than any move has.
     """
     problem = setting.problem
-    loaded = _loaded(problem)
-    if not problem.load.coulomb or not loaded or _allows_crawling(setting):
+    if not problem.load.coulomb or not _loaded(problem) or _allows_crawling(setting):
         return True
-    force = problem.limits.force
-    lenient = without(setting, [name for name in loaded if name != "force"])
-    if force is not None:
-        limits = lenient.problem.limits.model_copy(update={"force": _lenient(setting, force)})
-        lenient = replace(lenient, problem=lenient.problem.model_copy(update={"limits": limits}))
     duration = problem.move.fixed_time
     assert duration is not None
+    lenient = replace(setting, quantities=Shared)
     return convex(lenient, duration, to(smoothest(problem)), clock).outcome.claim is Claim.INFEASIBLE
+
+
+class Shared(Quantities):
+    """Quantities of a one-way axis with a share of its Coulomb friction, on every interval (Euler: at every node), of
+    at least that of the velocity in its limit: none at rest, never more than in motion, and affine."""
+
+    def _coulomb(self, velocity: Signal) -> Signal:
+        load, way = self.problem.load, self.problem.one_way
+        kept = getattr(self.model, "friction_share", None)
+        if kept is None:
+            kept = self.model.friction_share = self._share(way * velocity.nodes, bool(velocity.pieces))
+        friction = self.model.times(way * load.coulomb, kept)
+        return Signal(None, (friction,)) if velocity.pieces else Signal(friction, ())
+
+    def _share(self, speed: Any, whole: bool) -> Any:
+        model, count = self.model, self.mesh.intervals + (not whole)
+        share = model.vector(count, 1.0, np.zeros(count), np.ones(count))
+        limit = self.problem.limits.velocity
+        assert limit is not None
+        top = max(abs(limit.lowest), abs(limit.highest))
+        if np.isfinite(top):
+            for ends in (speed[:-1], speed[1:]) if whole else (speed,):
+                model.nonpositive(ends - model.times(top, share), top)
+        return share
 
 
 def is_charged(setting: Setting) -> bool:
@@ -71,11 +92,3 @@ def _allows_crawling(setting: Setting) -> bool:
 
 def _friction(problem: Problem) -> float:
     return problem.one_way * problem.load.coulomb
-
-
-def _lenient(setting: Setting, force: Limit) -> Limit:
-    """The limit with room for the friction of a crawl or, in the Euler scheme, for any change of friction."""
-    friction = _friction(setting.problem)
-    by = 2 * friction if setting.scheme.terms == 1 else 0.0
-    low, high = min(force.lowest + min(by, 0.0), friction), max(force.highest + max(by, 0.0), friction)
-    return Limit(min=None if force.min is None else low, max=None if force.max is None else high)
