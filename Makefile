@@ -25,7 +25,7 @@ demo: setup
 	$(python) -m problems.clemen_rupp --output demo
 
 test: setup
-	$(python) -m pytest
+	$(python) -m pytest --numprocesses 2 --dist worksteal
 	@$(MAKE) --no-print-directory lint
 
 lint: setup
