@@ -75,9 +75,10 @@ def _write_moves(plan: Plan, store: Store, folder: Path) -> list[Path]:
     if not wanted:
         return []
     moves.mkdir(exist_ok=True)
-    for name, key_and_ending in wanted.items():
-        key, ending = key_and_ending
-        write_atomically(inside(moves, name), store.files(key)[ending].encode())
+    for name, (key, ending) in wanted.items():
+        path, content = inside(moves, name), store.files(key)[ending].encode()
+        if not path.is_file() or path.read_bytes() != content:  # to write it again would cost a flush to the disk
+            write_atomically(path, content)
     return [moves]
 
 

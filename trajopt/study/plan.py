@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, ValidationError
 
 from trajopt import problem_file, units
 from trajopt.errors import BadInput
-from trajopt.fields import Section
+from trajopt.fields import Section, nearest
 from trajopt.problem import OneLine
 from trajopt.study.answer import key_of
 
@@ -118,7 +118,8 @@ class _Row:
 def load(path: str | Path, keep_going: bool = False, many: bool = False) -> Plan:
     """The plan in a study file, or in the ready-made study of that name.
 
-    With ``keep_going`` a case that cannot be meant is kept, as BAD_INPUT; ``many`` allows more than `MANY` cases. Raises BadInput, TooMany.
+    With ``keep_going`` a case that cannot be meant is kept, as BAD_INPUT; ``many`` allows more than `MANY`.
+    Raises BadInput, TooMany.
     """
     source = problem_file.find(Path(path), problem_file.ready_made("studies"), "study")
     name = str(path)
@@ -165,6 +166,10 @@ def _refuse_contradictions(file: _File, rows: Sequence[_Row], name: str) -> None
         raise problem_file.refused(name, "nothing varies; add [grid], [[case]], table or problems")
     if file.case and file.table is not None:
         raise problem_file.refused(name, "case: give the cases here or in the table, not both")
+    for key in (file.plot.x, file.plot.series, file.plot.panels) if file.plot else ():
+        varied = {"name", "problem", *file.grid, *(other for row in rows for other, _ in row.overrides)}
+        if key is not None and key not in varied:
+            raise problem_file.refused(name, f"plot: {key} is not varied{nearest(key, sorted(varied))}")
     for key in file.grid:
         if any(key == other for row in rows for other, _ in row.overrides):
             raise problem_file.refused(name, f"grid.{key}: is given a case as well; leave one of them out")

@@ -31,7 +31,7 @@ from trajopt.worker import GRACE
 SOLVE: Final = "trajopt.study.answer:solve"
 TRIES: Final = 2
 RECYCLE: Final = 500  # cases a worker solves
-_PRELOAD: Final = ["trajopt.solving", "trajopt.model_cvxpy", "trajopt.model_pyomo", "trajopt.report", "trajopt.table"]
+PRELOAD: Final = ["trajopt.solving", "trajopt.model_cvxpy", "trajopt.model_pyomo", "trajopt.report", "trajopt.table"]
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _OUT_OF_MEMORY: Final = 71  # exit code of a worker
 
@@ -207,7 +207,7 @@ def _context() -> ForkServerContext:
 
 def _serve_forks() -> None:
     """Start the server that workers are forked from: solvers loaded, one thread each, deaf to Ctrl-C from the start."""
-    _context().set_forkserver_preload(_PRELOAD)
+    _context().set_forkserver_preload(PRELOAD)
     with _environment(), _deaf((signal.SIGINT,)):
         forkserver.ensure_running()
 
