@@ -98,7 +98,7 @@ def _without_timings(folder: Path) -> dict[str, Any]:
 def test_texts_that_a_spreadsheet_would_run_are_quoted_and_numbers_are_not() -> None:
     texts = ["=HYPERLINK(1)", "+1", "-1+2", "@SUM(A1)", "\tx", "\rx", "\0x", "plain", "a=b"]
     table = pd.DataFrame({"=run": texts, "number": [-1.5] * 9})
-    read = pd.read_csv(io.BytesIO(export.csv(table).replace(b"\0", b"0")))
+    read = pd.read_csv(io.BytesIO(export.as_csv(table).replace(b"\0", b"0")))
     assert list(read.columns) == ["'=run", "number"] and (read["number"] == -1.5).all()
     assert [text[0] for text in read["'=run"]] == ["'"] * 7 + ["p", "a"]
 
@@ -279,7 +279,7 @@ def test_a_parent_killed_at_random_loses_nothing_that_it_announced(tmp_path: Pat
     study = tmp_path / "study.toml"
     study.write_text(HEAD + f"[{', '.join(repr(f'{i + 1} m/s') for i in range(300))}]\n")
     calm, found = (kills(study, tmp_path / str(count), count, seed=1) for count in (0, 6))
-    assert found["lost"] == [] and found["files"] == calm["files"]
+    assert found["lost"] == 0 and found["announced"] > 0 and found["files"] == calm["files"]
 
 
 def test_the_picture_shows_curves_and_where_there_is_no_move(small: tuple[Report, Path]) -> None:

@@ -195,7 +195,7 @@ except OSError as error:
 """
 
 
-@pytest.mark.parametrize("size", [0, 4096, 20_000, 45_000])
+@pytest.mark.parametrize("size", [0, 4096, 16_000, 28_000])
 def test_a_disk_that_is_full_ends_the_run_and_leaves_the_store_intact(
     size: int, tmp_path: Path, undisturbed: dict[str, bytes]
 ) -> None:

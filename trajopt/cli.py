@@ -106,7 +106,7 @@ def study(
     memory: Annotated[float, typer.Option("--memory", help="memory limit of each process, GiB")] = 4.0,
     trajectories: Annotated[bool, typer.Option("--trajectories", help="write the move of each case, too")] = False,
     keep_going: Annotated[bool, typer.Option("--keep-going", help="do without the cases that cannot be meant")] = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="solve everything again")] = False,
+    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on, or solve everything again")] = True,
     retry: Annotated[bool, typer.Option("--retry", help="solve again what ended in LIMIT or CRASHED")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="more than 10,000 cases are meant")] = False,
     as_json: AsJson = False,
@@ -115,7 +115,7 @@ def study(
     from trajopt.study import command
 
     _refuse_seconds(seconds)
-    options = command.options(workers, scheduler, seconds, memory, trajectories, fresh, retry)
+    options = command.options(workers, scheduler, seconds, memory, trajectories, not resume, retry)
     raise typer.Exit(command.run(source, output, options, keep_going, yes, as_json))
 
 

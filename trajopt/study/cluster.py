@@ -47,7 +47,7 @@ class Cluster:
     def answers(self, tasks: Iterator[Task]) -> Iterator[list[Done]]:
         """The answers as they come; see `trajopt.study.pool.Pool.answers`."""
         flying: dict[Any, Task] = {}
-        coming = self._distributed.as_completed()
+        coming = self._distributed.as_completed(loop=self._client.loop)
         while True:
             while len(flying) < AHEAD * max(self._size(), 1) and (task := next(tasks, None)) is not None:
                 future = self._client.submit(work, self._function, self._limits.seconds, task.question, pure=False)

@@ -31,9 +31,9 @@ def write(plan: Plan, answers: Sequence[Kept], store: Store, folder: Path) -> li
     """Write the table, the timings, the moves that the store has, the picture; returns their paths. Raises OSError."""
     table = rows.table(plan, answers)
     contents = {
-        TABLE: csv(table),
+        TABLE: as_csv(table),
         PARQUET: _parquet(table),
-        TIMINGS: csv(rows.timings(plan, answers)),
+        TIMINGS: as_csv(rows.timings(plan, answers)),
     }
     if plan.plot is not None:
         from trajopt.study.picture import picture
@@ -46,7 +46,7 @@ def write(plan: Plan, answers: Sequence[Kept], store: Store, folder: Path) -> li
     return written + _write_moves(plan, store, folder)
 
 
-def csv(table: pd.DataFrame) -> bytes:
+def as_csv(table: pd.DataFrame) -> bytes:
     """The table as CSV, with an apostrophe before texts that a spreadsheet would run; numbers as they are."""
     safe = table.rename(columns=_quoted)
     for heading in safe.select_dtypes(exclude="number").columns:
@@ -55,7 +55,10 @@ def csv(table: pd.DataFrame) -> bytes:
 
 
 def _quoted(value: Any) -> Any:
-    return f"'{value}" if isinstance(value, str) and value.startswith(_RUN_BY_SPREADSHEETS) else value
+    if not isinstance(value, str):
+        return value
+    safe = f"'{value}" if value.startswith(_RUN_BY_SPREADSHEETS) else value
+    return safe.replace("\r", " ")  # which readers take for the end of a row, and pandas does not quote
 
 
 def _parquet(table: pd.DataFrame) -> bytes:
