@@ -183,7 +183,9 @@ def _serve(asked: Connection, function: str, limits: Limits) -> None:
     """What a worker does, until the other end of the pipe is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # the system ends us
-    resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    memory = limits.memory if most == resource.RLIM_INFINITY else min(limits.memory, most)
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     module, _, name = function.partition(":")
     solve = getattr(importlib.import_module(module), name)
