@@ -16,6 +16,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import trajopt
 from trajopt.study import answer, plan, pool
 from trajopt.study.run import Options, run
@@ -60,7 +62,7 @@ def poisoned(asked: str) -> str:
 def _eat() -> None:
     kept = []
     while True:
-        kept.append(bytearray(1 << 26))
+        kept.append(np.empty(1 << 26))
 
 
 def invented(asked: str) -> str:

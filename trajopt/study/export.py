@@ -39,6 +39,8 @@ def write(plan: Plan, answers: Sequence[Kept], store: Store, folder: Path) -> li
         from trajopt.study.picture import picture
 
         contents[PICTURE] = picture(plan, table)
+    else:  # one of an earlier edition would show something else
+        inside(folder, PICTURE).unlink(missing_ok=True)
     written = []
     for name, content in contents.items():
         written.append(inside(folder, name))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -19,12 +17,9 @@ from trajopt.errors import BadInput
 from trajopt.fields import Section, nearest
 from trajopt.problem import OneLine
 from trajopt.study.answer import key_of
-
-Override = tuple[str, Any]
+from trajopt.study.overrides import MOST, Override, Row, flat, listed, read_table
 
 MANY: Final = 10_000  # cases: more are refused unless they are meant
-MOST: Final = 1_000_000
-LARGEST_TABLE: Final = 10_000_000  # bytes
 _SHOWN: Final = 20  # faults looked for before the file is refused
 
 
@@ -49,7 +44,7 @@ def _some(value: Any) -> Any:
 
 
 def _axes(grid: dict[str, Any]) -> dict[str, Any]:
-    axes = dict(_flat("", grid))
+    axes = dict(flat("", grid))
     for key, values in axes.items():
         if not isinstance(values, list):
             raise ValueError(f'{key}: must be a list of values such as ["0.8 s", "1 s"], got {units.shown(values)}')
@@ -105,16 +100,6 @@ class Plan:
         return [case for case in self.cases if not case.fault]
 
 
-@dataclass(frozen=True)
-class _Row:
-    """A line of the table, or an entry of the list."""
-
-    where: str
-    overrides: tuple[Override, ...] = ()
-    name: str = ""
-    fault: str = ""
-
-
 def load(path: str | Path, keep_going: bool = False, many: bool = False) -> Plan:
     """The plan in a study file, or in the ready-made study of that name.
 
@@ -159,7 +144,7 @@ def _refuse_many(count: int, many: bool, name: str) -> None:
         raise TooMany(str(problem_file.refused(name, text)))
 
 
-def _refuse_contradictions(file: _File, rows: Sequence[_Row], name: str) -> None:
+def _refuse_contradictions(file: _File, rows: Sequence[Row], name: str) -> None:
     if (file.problem is None) == (not file.problems):
         raise problem_file.refused(name, 'problem: give one problem = "move.toml" or a list of problems')
     if not (file.problems or file.grid or file.case or file.table):
@@ -185,76 +170,15 @@ def _bases(file: _File, name: str, folder: Path) -> Iterator[tuple[str, dict[str
         yield Path(text).stem, problem_file.read_toml(problem_file.read_text(path), f"{name}: {text}")
 
 
-def _rows(file: _File, name: str, folder: Path) -> list[_Row]:
+def _rows(file: _File, name: str, folder: Path) -> list[Row]:
     if file.table is not None:
         return read_table(folder / file.table)
     if not file.case:
-        return [_Row("")]
-    return [_listed(f"case {i}", entry, name) for i, entry in enumerate(file.case, 1)]
+        return [Row("")]
+    return [listed(f"case {i}", entry, name) for i, entry in enumerate(file.case, 1)]
 
 
-def _listed(where: str, entry: Mapping[str, Any], name: str) -> _Row:
-    overrides = dict(_flat("", entry))
-    label = overrides.pop("name", "")
-    if not isinstance(label, str) or not label.isprintable():
-        raise problem_file.refused(name, f"{where}: name must be one line of text in quotes, got {units.shown(label)}")
-    return _Row(where, tuple(overrides.items()), label)
-
-
-def _flat(prefix: str, section: Mapping[str, Any]) -> Iterator[Override]:
-    """Dotted keys and their values. A key in quotes with dots in it stands for itself: its value is not opened."""
-    for key, value in section.items():
-        if isinstance(value, Mapping) and "." not in key:
-            yield from _flat(f"{prefix}{key}.", value)
-        else:
-            yield prefix + key, value
-
-
-def read_table(path: Path) -> list[_Row]:
-    """The rows of a CSV file of overrides: dotted keys in the header, ``name`` for a label; an empty cell overrides
-    nothing. A malformed row has a ``fault``. Raises BadInput."""
-    name = str(path)
-    text = problem_file.read_text(path, LARGEST_TABLE)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    rows: list[_Row] = []
-    try:
-        header = [cell.strip() for cell in next(reader, [])]
-        _refuse_header(header, name)
-        for cells in reader:
-            if cells:
-                rows.append(_row(f"{name}, line {reader.line_num}", header, cells))
-            if len(rows) > MOST:
-                raise problem_file.refused(name, f"more than {MOST:,} rows; split it")
-    except csv.Error as error:
-        raise problem_file.refused(name, f"line {reader.line_num}: {error}; quote cells as in CSV") from None
-    if not rows:
-        raise problem_file.refused(name, "has no rows; write dotted keys in the first line and a case a line below")
-    return rows
-
-
-def _refuse_header(header: Sequence[str], name: str) -> None:
-    for cell in header:
-        if not cell:
-            raise problem_file.refused(name, "line 1: an empty heading; write a dotted key such as move.time, or name")
-        if header.count(cell) > 1:
-            raise problem_file.refused(name, f"line 1: the heading {units.shown(cell)} is there twice; leave one out")
-
-
-def _row(where: str, header: Sequence[str], cells: Sequence[str]) -> _Row:
-    if len(cells) != len(header):
-        return _Row(where, fault=f"{where}: has {len(cells)} cells, the header {len(header)}; write one a heading")
-    given = {key: cell for key, cell in zip(header, cells, strict=True) if cell.strip()}
-    label = given.pop("name", "")
-    try:
-        if not label.isprintable():
-            raise problem_file.refused(where, f"name must be one line of printable text, got {units.shown(label)}")
-        overrides = tuple((key, problem_file.read_value(cell, f"{where}, {key}")) for key, cell in given.items())
-    except BadInput as error:
-        return _Row(where, fault=str(error))
-    return _Row(where, overrides, label)
-
-
-def _combined(bases: int, rows: Sequence[_Row], axes: Mapping[str, Sequence[Any]]) -> Iterator[Case]:
+def _combined(bases: int, rows: Sequence[Row], axes: Mapping[str, Sequence[Any]]) -> Iterator[Case]:
     """Problems × rows × grid, the last fastest."""
     every = product(range(bases), rows, product(*axes.values()))
     for number, (base, row, values) in enumerate(every, 1):
