@@ -58,6 +58,7 @@ CASES: Final = (
     Bad("short-row", TABLE, ("cases.csv, line 3: has 1 cells, the header 2",), b"move.time,title\n1 s,a\n2 s\n"),
     Bad("long-row", TABLE, ("cases.csv, line 2: has 3 cells, the header 1",), b"move.time\n1 s,a,b\n"),
     Bad("no-heading", TABLE, ("line 1: an empty heading",), b"move.time,\n1 s,a\n"),
+    Bad("semicolons", TABLE, ("line 1", "write commas between cells"), b"move.time;limits.jerk\n1 s;2 m/s^3\n"),
     Bad("heading-twice", TABLE, ("line 1", "'move.time' is there twice"), b"move.time,move.time\n1 s,2 s\n"),
     Bad("open-quote", TABLE, ("cases.csv", "line 2"), b'move.time\n"1 s\n'),
     Bad("duplicate-rows", TABLE, ("line 4: states the same problem as", "line 2"), b"move.time\n1 s\n2 s\n1 s\n"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import time
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 import trajopt
+from problems import clemen_rupp
 from tests.bad_studies import CASES, Bad, write
 from tests.study_faults import STILL
 from trajopt import problem_file
@@ -82,6 +84,12 @@ def test_problems_times_cases_times_grid(tmp_path: Path) -> None:
 def test_ready_made_studies_load(name: str) -> None:
     made = plan.load(name)
     assert made.title and len(made.cases) >= 30 and all(case.key for case in made.cases)
+
+
+def test_the_study_of_the_tables_is_the_paper_s_cases_by_both_schemes() -> None:
+    cases = itertools.product(clemen_rupp.PRINTED, clemen_rupp.SCHEMES)
+    stated = [trajopt.load(f"clemen_rupp_{name}", [f"transcription.scheme={scheme}"]).hash for name, scheme in cases]
+    assert sorted(_hashes(plan.load("clemen_rupp_tables"))) == sorted(stated)
 
 
 def test_keep_going_keeps_what_cannot_be_meant_as_such(tmp_path: Path) -> None:

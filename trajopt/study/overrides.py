@@ -70,6 +70,8 @@ def read_table(path: Path) -> list[Row]:
 
 def _refuse_header(header: Sequence[str], name: str) -> None:
     for cell in header:
+        if ";" in cell:
+            raise problem_file.refused(name, f"line 1: {units.shown(cell)} has a semicolon; write commas between cells")
         if not cell:
             raise problem_file.refused(name, "line 1: an empty heading; write a dotted key such as move.time, or name")
         if header.count(cell) > 1:
