@@ -11,11 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
+import pytest
 
 from tests.study_faults import STILL, stills
 from trajopt.study import plan, pool
 from trajopt.study.pool import Limits
 from trajopt.study.run import Options, Report, run
+from trajopt.study.store import Store
 
 POISONED = Options(workers=2, limits=Limits(seconds=0.7, memory=3 << 30), function="tests.study_faults:poisoned")
 POISON = {"case3": "crash", "case4": "hang", "case8": "eat", "case9": "leave"}
@@ -32,6 +34,13 @@ def test_poison_harms_none_but_itself_and_is_named(tmp_path: Path) -> None:
     failures = {c.number: key for key, cases in report.failures().items() for c in cases}
     assert failures == EXPECTED
     assert report.counts["SOLVED"] == 16
+
+
+def test_workers_that_do_not_come_up_are_nobody_s_fault(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="before they are ready.*worker processes"):
+        run(stills(3), tmp_path, Options(function="tests.no_such_module:solve", workers=2))
+    with Store(tmp_path) as store:
+        assert not list(store.answers())
 
 
 def test_workers_killed_at_random_lose_nothing(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ loaded the solvers, so that a new one costs little, and replaced now and then: s
 
 from __future__ import annotations
 
+import errno
 import importlib
 import json
 import multiprocessing
@@ -34,6 +35,7 @@ RECYCLE: Final = 500  # cases a worker solves
 PRELOAD: Final = ["trajopt.solving", "trajopt.model_cvxpy", "trajopt.model_pyomo", "trajopt.report", "trajopt.table"]
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _OUT_OF_MEMORY: Final = 71  # exit code of a worker
+_STILLBORN: Final = 10  # workers in a row that end before they are ready: no case is to blame
 
 
 class Task(NamedTuple):
@@ -68,11 +70,13 @@ class Pool:
 
     def __init__(self, workers: int, limits: Limits = DEFAULT, function: str = SOLVE) -> None:
         self._limits, self._function = limits, function
+        self._stillborn = 0
         _serve_forks()
         self._workers = [self._new() for _ in range(workers)]
 
     def answers(self, tasks: Iterator[Task]) -> Iterator[list[Done]]:
-        """The answers in the order in which they come, those that come together in a list."""
+        """The answers in the order in which they come, those that come together in a list. Raises OSError when no
+        worker comes up."""
         again: deque[_Try] = deque()
         while True:
             for i in range(len(self._workers)):
@@ -110,22 +114,34 @@ class Pool:
         self._workers[i].ask(wanted)
 
     def _collect(self, i: int, again: deque[_Try]) -> Done | None:
-        """The answer of a worker. It has died: another try, or the verdict on the case."""
+        """The answer of a worker, or None when it is but ready. It has died: another try, or the verdict on the case."""
         worker = self._workers[i]
         tried = worker.asked
         assert tried is not None
         try:
-            seconds, answer = worker.answer()
+            found = worker.answer()
         except (EOFError, ConnectionError):
-            took = time.monotonic() - tried.since
-            worker.close()
-            code = worker.process.exitcode
-            self._workers[i] = self._new()
-            if tried.number < TRIES:
-                again.append(replace(tried, number=tried.number + 1))
-                return None
-            return Done(tried.task.key, json.dumps(self._verdict(code)), took, tried.number)
-        return Done(tried.task.key, answer, seconds, tried.number)
+            return self._buried(i, tried, again)
+        self._stillborn = 0
+        return found and Done(tried.task.key, found[1], found[0], tried.number)
+
+    def _buried(self, i: int, tried: _Try, again: deque[_Try]) -> Done | None:
+        """Replace a worker that has died; the verdict on its case, if there is not to be another try."""
+        worker = self._workers[i]
+        worker.close()
+        code = worker.process.exitcode
+        self._workers[i] = self._new()
+        if not worker.ready:
+            again.append(tried)
+            self._stillborn += 1
+            if self._stillborn >= _STILLBORN:
+                text = f"end with code {code} before they are ready; a script needs if __name__ == '__main__'"
+                raise OSError(errno.ECHILD, text, "worker processes")
+            return None
+        if tried.number < TRIES:
+            again.append(replace(tried, number=tried.number + 1))
+            return None
+        return Done(tried.task.key, json.dumps(self._verdict(code)), time.monotonic() - tried.since, tried.number)
 
     def _verdict(self, code: int | None) -> dict[str, object]:
         if code == -signal.SIGALRM:
@@ -156,6 +172,7 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.asked: _Try | None = None
+        self.ready = False
         self.served = 0
 
     @property
@@ -167,9 +184,13 @@ class _Worker:
         with suppress(ConnectionError):  # it has died: to be found out when the answer is collected
             self.connection.send_bytes(wanted.task.question.encode())
 
-    def answer(self) -> tuple[float, str]:
-        """Wall time in s, and JSON. Raises EOFError or ConnectionError when the process has died."""
+    def answer(self) -> tuple[float, str] | None:
+        """Wall time in s, and JSON; None for its first words, that it is ready. Raises EOFError or ConnectionError when
+        the process has died."""
         seconds, _, text = self.connection.recv_bytes().decode().partition("\n")
+        if not self.ready:
+            self.ready = True
+            return None
         self.asked, self.served = None, self.served + 1
         return float(seconds), text
 
@@ -189,6 +210,7 @@ def _serve(asked: Connection, function: str, limits: Limits) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     module, _, name = function.partition(":")
     solve = getattr(importlib.import_module(module), name)
+    asked.send_bytes(b"ready")
     while True:
         try:
             question = asked.recv_bytes().decode()
