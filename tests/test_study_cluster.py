@@ -88,6 +88,11 @@ def test_real_answers_come_back_as_json(scheduler: str, tmp_path: Path) -> None:
     assert files(tmp_path / "cluster") == files(tmp_path / "local")
 
 
+def test_workers_without_our_code_are_named(scheduler: str, tmp_path: Path) -> None:
+    with pytest.raises(trajopt.BadInput, match="a worker cannot begin.*no_such_module.*install the same trajopt"):
+        run(stills(2), tmp_path, Options(scheduler=scheduler, function="tests.no_such_module:solve"))
+
+
 LOCAL = ("tcp://127.0.0.1:8786", "127.0.0.1:8786", "localhost:1", "tcp://[::1]:8786")
 
 

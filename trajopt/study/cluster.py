@@ -86,7 +86,8 @@ class Cluster:
             raise BadInput(f"--scheduler {self._address}: cannot be reached: {why}; is it running?") from None
 
     def _done(self, key: str, future: Any) -> Done:
-        """The answer of a case, or what became of it. Raises OSError when the scheduler is gone."""
+        """The answer of a case, or what became of it. Raises OSError when the scheduler is gone, BadInput for workers
+        without our code."""
         try:
             seconds, answer = future.result()
         except self._distributed.KilledWorker:
@@ -96,6 +97,9 @@ class Cluster:
         except CancelledError:
             gone = "the scheduler is gone; what was finished is kept, the same command resumes"
             raise OSError(errno.ECONNABORTED, gone, self._address) from None
+        except Exception as error:  # a case raises nothing else: it was not begun
+            how = "install the same trajopt where the workers run"
+            raise BadInput(f"--scheduler {self._address}: a worker cannot begin: {error!r}; {how}") from None
         else:
             return Done(key, answer, seconds, 1)
         return Done(key, json.dumps(unsolved(Verdict.CRASHED, text)), 0.0, 1)

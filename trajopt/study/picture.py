@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from trajopt.plot import COLOURS, GREY, pretty
 from trajopt.study.plan import Plan, Plot
@@ -80,6 +81,9 @@ def _scale(axes: Axes, table: pd.DataFrame, y: str) -> None:
         axes.text(0.5, 0.5, f"no case has {y}", ha="center", transform=axes.transAxes, fontsize=8)
     elif values.min() > 0 and values.max() > _DECADE * values.min():
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
     elif values.min() >= 0:
         axes.set_ylim(bottom=0.0)
 

@@ -114,7 +114,7 @@ class Pool:
         self._workers[i].ask(wanted)
 
     def _collect(self, i: int, again: deque[_Try]) -> Done | None:
-        """The answer of a worker, or None when it is but ready. It has died: another try, or the verdict on the case."""
+        """The answer of a worker, or None when it is but ready. It has died: another try, or the case's verdict."""
         worker = self._workers[i]
         tried = worker.asked
         assert tried is not None
