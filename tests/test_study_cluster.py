@@ -75,10 +75,10 @@ def test_a_killed_worker_costs_nothing_and_the_rows_are_those_of_local_processes
     pids.mkdir()
     monkeypatch.setenv("STUDY_PIDS", str(pids))
     address, killer = request.getfixturevalue("scheduler"), Killer(pids)
-    function = "tests.test_study_cluster:signed"
-    report = run(stills(60), tmp_path / "cluster", Options(scheduler=address, function=function), killer)
+    signing = Options(scheduler=address, function="tests.test_study_cluster:signed")
+    report = run(stills(60), tmp_path / "cluster", signing, killer)
     assert killer.killed and len(list(pids.iterdir())) >= 3 and report.counts["SOLVED"] == 54
-    run(stills(60), tmp_path / "local", Options(workers=2, function=function))
+    run(stills(60), tmp_path / "local", Options(workers=2, function="tests.study_faults:invented"))
     assert files(tmp_path / "cluster") == files(tmp_path / "local")
 
 
