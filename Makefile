@@ -34,6 +34,7 @@ lint: setup
 
 bench: setup
 	$(python) -m bench.least_time --output build/bench
+	$(python) -m bench.study --output build/bench
 
 soak: setup
 	$(python) -m tests.soak

@@ -31,7 +31,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from tests import test_plant_random, test_switching
+from tests import study_soak, test_plant_random, test_switching
 from tests.campaign import Record, draw, judge, remarks, shrunk
 
 STORE: Final = Path(__file__).parents[1] / ".soak"
@@ -39,6 +39,14 @@ SPECS: Final = 20_000
 PLANTS: Final = 300
 CHAINS: Final = 200_000
 _BATCH: Final = 500  # chains a task
+CASES: Final = 10_000
+KILLS: Final = 200
+STAGES: Final = {
+    "plants": "linear plants, not solved and proven",
+    "chains": "least times, unlike Ruckig's",
+    "studies": "cases of a study with poison in it, ended otherwise than they had to",
+    "kills": "kills of a study, in rounds that lost something",
+}
 MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
 PATIENCE: Final = 600.0  # s for one spec and those that wait before it: beyond, its worker hangs
 _LOOK: Final = 60.0  # s between looks for one that hangs
@@ -64,6 +72,8 @@ def main(arguments: list[str] | None = None) -> int:
         summary["plants"] = _stage(test_plant_random.fault, options.plants, options.workers)
         batches = -(-options.chains // _BATCH)
         summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
+        summary["studies"] = study_soak.poison(options.cases, options.workers)
+        summary["kills"] = study_soak.killed(options.kills)
     _print(summary, console)
     path = journal.path.with_suffix(".json")
     path.write_text(json.dumps(summary, indent=1))
@@ -72,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _is_wrong(summary: dict[str, Any]) -> bool:
-    faults = any(summary.get(stage, {}).get("faults") for stage in ("plants", "chains"))
+    faults = any(summary.get(stage, {}).get("faults") for stage in STAGES)
     return summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or faults
 
 
@@ -133,6 +143,8 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
     parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
     parser.add_argument("--chains", type=int, default=CHAINS, help="how many least times against Ruckig's (200000)")
+    parser.add_argument("--cases", type=int, default=CASES, help="how many cases of a study with poison in it (10000)")
+    parser.add_argument("--kills", type=int, default=KILLS, help="how many kills of a study (200)")
     parser.add_argument("--seeds", nargs="+", default=[], help="only the specs of these seeds, or of FROM:TO")
     parser.add_argument("--afresh", action="store_true", help="judge again what the journal has")
     parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
@@ -296,8 +308,7 @@ def _print(summary: dict[str, Any], console: Console) -> None:
     for failure in summary["failures"]:
         for why in failure["why"]:
             console.print(f"seed {failure['seed']} {failure['status']}: {why}", highlight=False, markup=False)
-    stages = {"plants": "linear plants, not solved and proven", "chains": "least times, unlike Ruckig's"}
-    for stage, words in stages.items():
+    for stage, words in STAGES.items():
         if stage in summary:
             faults = summary[stage]["faults"]
             console.print(f"{summary[stage]['count']} {words}: {len(faults)}")

@@ -1,4 +1,4 @@
-"""The command line: ``trajopt solve | synchronise | check | route | problems``."""
+"""The command line: ``trajopt solve | study | synchronise | check | route | problems``."""
 
 from __future__ import annotations
 
@@ -94,6 +94,29 @@ def synchronise(
         for solution in solutions:
             print_solution(solution)
     raise typer.Exit(worst.exit_code)
+
+
+@app.command()
+def study(
+    source: Annotated[str, typer.Argument(metavar="STUDY", help="a study file, or the name of a ready-made study")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder for the store and the table")],
+    workers: Annotated[int, typer.Option("--workers", help="processes; 0: one a processor")] = 0,
+    scheduler: Annotated[str | None, typer.Option("--scheduler", help="address of a Dask scheduler instead")] = None,
+    seconds: Annotated[float, typer.Option("--seconds", help="wall-time limit of each case, s")] = 600.0,
+    memory: Annotated[float, typer.Option("--memory", help="memory limit of each process, GiB")] = 4.0,
+    trajectories: Annotated[bool, typer.Option("--trajectories", help="write the move of each case, too")] = False,
+    keep_going: Annotated[bool, typer.Option("--keep-going", help="do without the cases that cannot be meant")] = False,
+    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on, or solve everything again")] = True,
+    retry: Annotated[bool, typer.Option("--retry", help="solve again what ended in LIMIT or CRASHED")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="more than 10,000 cases are meant")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Solve a study's cases; run again, it resumes. Exits 0 when every case is solved."""
+    from trajopt.study import command
+
+    _refuse_seconds(seconds)
+    options = command.options(workers, scheduler, seconds, memory, trajectories, not resume, retry)
+    raise typer.Exit(command.run(source, output, options, keep_going, yes, as_json))
 
 
 @app.command()

@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,6 +46,7 @@ _LISTS: Final = {
     "via": '[{ time = "0.5 s", position = "0.1 m" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
+_KEY_EXAMPLE: Final = 'for example move.end.position="0.3 m"'
 _SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"
 _ALIASES: Final = {
     "load": {"mass": "inertia", "force_constant": "torque_constant"},
@@ -58,21 +59,25 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
 
     Raises BadInput with one line naming the file, the field and the remedy.
     """
-    source = _find(Path(path))
-    return parse(read_text(source), overrides, name=str(path))
+    return parse(read_text(find(Path(path), ready_made())), overrides, name=str(path))
 
 
 def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem:
     """The problem stated by a TOML text. Raises BadInput."""
-    _refuse_marks(text, name)
-    _refuse_deep(text, name)
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise _refused(name, f"not a TOML file: {_remedied(str(error))}") from None
+    data = read_toml(text, name)
     for override in overrides:
         _override(data, override)
     return from_dict(data, name)
+
+
+def read_toml(text: str, name: str) -> dict[str, Any]:
+    """The content of a TOML text, under the caps. Raises BadInput."""
+    _refuse_marks(text, name)
+    _refuse_deep(text, name)
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise refused(name, f"not a TOML file: {_remedied(str(error))}") from None
 
 
 def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem:
@@ -85,7 +90,7 @@ def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantP
     try:
         return p.Problem.model_validate({"rotary": rotary, **data}, context={"rotary": rotary, "texts_only": True})
     except ValidationError as error:
-        raise _refused(name, _as_written(explain(error), written)) from None
+        raise refused(name, _as_written(explain(error), written)) from None
 
 
 def _plant(data: dict[str, Any], name: str) -> PlantProblem:
@@ -93,36 +98,36 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
 
     for key in ("move", "limits", "load", "vibration", "objective", "transcription", "rotary"):
         if key in data:
-            raise _refused(name, f"{key}: belongs to an axis and cannot stand beside [plant]; leave one of them out")
+            raise refused(name, f"{key}: belongs to an axis and cannot stand beside [plant]; leave one of them out")
     try:
         return PlantProblem.model_validate(data, context={"texts_only": True})
     except ValidationError as error:
-        raise _refused(name, explain(error, PlantProblem)) from None
+        raise refused(name, explain(error, PlantProblem)) from None
 
 
-def read_text(path: Path) -> str:
-    """The text of a regular UTF-8 file of at most 1 MB. Raises BadInput."""
+def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
+    """The text of a regular UTF-8 file of at most ``largest`` bytes. Raises BadInput."""
     name = str(path)
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
         try:
             regular = stat.S_ISREG(os.fstat(handle).st_mode)
-            raw = _first_bytes(handle, LARGEST_FILE + 1) if regular else b""
+            raw = _first_bytes(handle, largest + 1) if regular else b""
         finally:
             os.close(handle)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise _refused(name, f"cannot be read: {reason}; give a problem file or a ready-made problem's name") from None
+        raise refused(name, f"cannot be read: {reason}; give a problem file or a ready-made problem's name") from None
     if not regular:
-        raise _refused(name, "not a regular file; give a problem file")
-    if len(raw) > LARGEST_FILE:
-        raise _refused(name, "larger than 1 MB; a problem file takes a few lines")
+        raise refused(name, "not a regular file; give a problem file")
+    if len(raw) > largest:
+        raise refused(name, f"larger than {largest // 1_000_000} MB; a problem file takes a few lines")
     if raw.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")) or b"\0" in raw:
-        raise _refused(name, _SAVE_PLAIN)
+        raise refused(name, _SAVE_PLAIN)
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise _refused(name, f"not UTF-8 at byte {error.start}; save it as plain UTF-8") from None
+        raise refused(name, f"not UTF-8 at byte {error.start}; save it as plain UTF-8") from None
 
 
 def _first_bytes(handle: int, most: int) -> bytes:
@@ -135,24 +140,24 @@ def _first_bytes(handle: int, most: int) -> bytes:
 
 def _refuse_marks(text: str, name: str) -> None:
     if text.startswith("\ufeff") or "\0" in text:
-        raise _refused(name, _SAVE_PLAIN)
+        raise refused(name, _SAVE_PLAIN)
 
 
-def _find(path: Path) -> Path:
-    if path.suffix == "" and path.name == str(path) and not os.path.exists(path):
-        ready = ready_made()
+def find(path: Path, ready: Mapping[str, Path], what: str = "problem", folder: Path = Path()) -> Path:
+    """The file at ``path``, seen from ``folder``, or the ``ready``-made one of that name. Raises BadInput."""
+    if path.suffix == "" and path.name == str(path) and not os.path.exists(folder / path):
         if str(path) not in ready:
-            raise _refused(str(path), f"no such file or ready-made problem{nearest(str(path), list(ready))}")
+            raise refused(str(path), f"no such file or ready-made {what}{nearest(str(path), list(ready))}")
         return ready[str(path)]
-    return path
+    return folder / path
 
 
-def ready_made() -> dict[str, Path]:
-    """The ready-made problems: name -> file, sorted. (Data of the package ``problems``, which is not imported.)"""
+def ready_made(folder: str = "") -> dict[str, Path]:
+    """The ready-made problems, or what is in a folder beside them: name -> file, sorted. (Data of the package
+    ``problems``, which is not imported.)"""
     from importlib.resources import files
 
-    folder = Path(str(files("problems")))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return {path.stem: path for path in sorted((Path(str(files("problems"))) / folder).glob("*.toml"))}
 
 
 def _refuse_deep(text: str, name: str) -> None:
@@ -174,7 +179,7 @@ def _refuse_deep(text: str, name: str) -> None:
             excess = f"a number or key of more than {_LONGEST_WORD} digits or letters"
         if excess:
             line = text.count("\n", 0, token.start()) + 1
-            raise _refused(name, f"line {line}: {excess}; a problem file needs nothing of the kind")
+            raise refused(name, f"line {line}: {excess}; a problem file needs nothing of the kind")
 
 
 def _remedied(message: str) -> str:
@@ -185,12 +190,16 @@ def _remedied(message: str) -> str:
 
 
 def _override(data: dict[str, Any], override: str) -> None:
-    """Apply ``move.end.position=0.3 m``: the value is TOML where it reads as TOML, else a text."""
+    """Apply ``move.end.position=0.3 m``."""
     key, equals, text = override.partition("=")
-    parts = [part.strip() for part in key.split(".")]
+    if not equals:
+        raise refused(f"--set {override}", f"write key=value, {_KEY_EXAMPLE}")
     where = f"--set {key.strip()}"
-    if not equals or not all(parts) or len(parts) > _DEEPEST:
-        raise _refused(f"--set {override}", 'write key=value, for example move.end.position="0.3 m"')
+    assign(data, key, read_value(text, where), where)
+
+
+def read_value(text: str, where: str) -> Any:
+    """The value of an override: TOML where it reads as TOML, else a text. Raises BadInput."""
     _refuse_marks(text, where)
     _refuse_deep(text, where)
     try:
@@ -198,13 +207,21 @@ def _override(data: dict[str, Any], override: str) -> None:
     except (tomllib.TOMLDecodeError, RecursionError, ValueError):
         value = text.strip()
         if value[:1] in ("[", "{"):
-            raise _refused(where, f'{units.shown(value)} is no TOML list or table; quote it for the shell, such as'
+            raise refused(where, f'{units.shown(value)} is no TOML list or table; quote it for the shell, such as'
                            """ 'limits.velocity=["0 m/s", "0.5 m/s"]'""") from None
+    return value
+
+
+def assign(data: dict[str, Any], key: str, value: Any, where: str) -> None:
+    """Set a dotted key of a problem file's content; what says the same in other words goes. Raises BadInput."""
+    parts = [part.strip() for part in key.split(".")]
+    if not all(parts) or len(parts) > _DEEPEST:
+        raise refused(where, f"write key=value, {_KEY_EXAMPLE}")
     section: Any = data
     for i, part in enumerate(parts[:-1]):
         section = section.setdefault(part, {})
         if not isinstance(section, dict):
-            raise _refused(where, f"{'.'.join(parts[: i + 1])} is not a section; set it as a whole")
+            raise refused(where, f"{'.'.join(parts[: i + 1])} is not a section; set it as a whole")
     for other in _replaced(parts, value):
         section.pop(other, None)
     section[parts[-1]] = value
@@ -229,7 +246,7 @@ def _renamed(section: str, value: Any, name: str) -> Any:
     for alias, field in _ALIASES[section].items():
         if alias in value:
             if field in value:
-                raise _refused(name, f"{section}.{alias}: give {alias} or {field}, not both")
+                raise refused(name, f"{section}.{alias}: give {alias} or {field}, not both")
             value[field] = value.pop(alias)
     return value
 
@@ -331,7 +348,7 @@ def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
     return [*model.model_fields, *aliases, *extra]
 
 
-def _refused(name: str, message: str) -> BadInput:
+def refused(name: str, message: str) -> BadInput:
     """One printable line of at most 500 characters."""
     return BadInput(f"{_one_line(name, 110)}: {_one_line(message, 380)}")
 

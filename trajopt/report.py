@@ -97,10 +97,16 @@ def _comparison_text(row: Mapping[str, Any]) -> str:
 def objective_text(solution: Solution) -> str:
     """``power linf = 1.68200675``: what was minimised and its value, with its unit where it is a single signal."""
     terms = solution.problem.objective.terms
-    text = " + ".join((f"{t.weight:g} × " if len(terms) > 1 else "") + solution.problem.shown(t.label) for t in terms)
+    text = objective_name(solution.problem)
     kind = units.kinds(solution.problem.rotary)[terms[0].minimize]
     pure = len(terms) == 1 and (terms[0].norm is None or terms[0].norm.name in ("l2", "linf"))
     return f"{text} = {solution.objective:.9g}" + (f" {kind.unit}" if pure else "")
+
+
+def objective_name(problem: Problem) -> str:
+    """``power linf``, ``0.5 × energy + 0.5 × power linf``: what is minimised."""
+    terms = problem.objective.terms
+    return " + ".join((f"{t.weight:g} × " if len(terms) > 1 else "") + problem.shown(t.label) for t in terms)
 
 
 def _between_nodes(solution: Solution) -> str | None:

@@ -82,6 +82,12 @@ class Solution:
 
         return frame(self._moved())
 
+    def csv(self) -> str:
+        """The text of trajectory.csv. Raises NoSolution."""
+        from trajopt.table import csv
+
+        return csv(self)
+
     def sampled(self, period: float) -> pd.DataFrame:
         """The set-points of a controller: time (s), position, velocity, … at every ``period`` (s) and at the end.
 
@@ -178,8 +184,6 @@ class Solution:
 
         Without a solution only result.json is written. Raises OSError.
         """
-        from trajopt.table import write_csv
-
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)
         pictures: dict[str, Callable[[], Any]] = {
@@ -195,7 +199,7 @@ class Solution:
         if self.trajectory is None:
             return written
         written.append(directory / "trajectory.csv")
-        write_csv(self, written[-1])
+        write_atomically(written[-1], self.csv().encode())
         if not self.problem.vibration:
             del pictures["vibration.png"]
         if self.route.model != "arcs":

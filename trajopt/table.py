@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from trajopt import units
-from trajopt.files import write_atomically
 from trajopt.problem import DERIVATIVES
 from trajopt.trajectory import Trajectory
 
@@ -52,10 +50,10 @@ def frame(trajectory: Trajectory) -> pd.DataFrame:
     return table
 
 
-def write_csv(solution: Solution, path: Path) -> None:
-    """The frame as CSV: units in the header, 17 digits, the problem's hash in a leading comment. Raises OSError."""
+def csv(solution: Solution) -> str:
+    """The frame as CSV: units in the header, 17 digits, the problem's hash in a leading comment. Raises NoSolution."""
     table = solution.frame
     header = ",".join(f"{SYMBOLS[name]} [{unit}]" for name, unit in table.attrs["units"].items())
     lines = [f"# trajopt {solution.problem.hash}", header]
     lines += [",".join(f"{x:.17g}" for x in row) for row in table.to_numpy()]
-    write_atomically(path, ("\n".join(lines) + "\n").encode())
+    return "\n".join(lines) + "\n"

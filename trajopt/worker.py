@@ -36,11 +36,11 @@ def solve(problem: Problem | PlantProblem, seconds: float | None = None) -> Solu
     solver is not installed, InternalError when a bound exceeds a checked answer.
     """
     if seconds is None:
-        return _here(problem, None)
+        return solve_here(problem, None)
     if not 0 < seconds < float("inf"):
         raise BadInput(f"seconds: must be > 0 and finite, got {seconds!r}; leave it out for no limit")
     if multiprocessing.current_process().daemon:  # which may have no child of its own
-        return _here(problem, seconds)
+        return solve_here(problem, seconds)
     return solve_apart(problem, seconds)
 
 
@@ -78,8 +78,8 @@ def solve_apart(problem: Problem | PlantProblem, seconds: float | None = None) -
     return found
 
 
-def _here(problem: Problem | PlantProblem, seconds: float | None) -> Solution | PlantSolution:
-    """Solve in this process."""
+def solve_here(problem: Problem | PlantProblem, seconds: float | None) -> Solution | PlantSolution:
+    """`solve` in this process, where the limit is kept between and within solver runs only."""
     if not isinstance(problem, Problem):
         from trajopt.plant.solving import solve as solve_plant
 
@@ -105,7 +105,7 @@ def _work(sender: Connection, problem: Problem | PlantProblem, seconds: float | 
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     answer: Any
     try:
-        answer = _here(problem, seconds)
+        answer = solve_here(problem, seconds)
     except Exception as error:
         error.add_note(_trace())
         answer = error

@@ -108,6 +108,13 @@ class PlantSolution:
         self._found()
         return []
 
+    def csv(self) -> str:
+        """The text of command.csv: times of the jumps and the level from each on. Raises NoSolution."""
+        command = self._found()
+        rows = zip(command.impulses[0], [*command.levels, command.u_ss], strict=True)
+        lines = [f"# trajopt {self.problem.hash}", "t [s],u", *(f"{t:.17g},{u:.17g}" for t, u in rows)]
+        return "\n".join(lines) + "\n"
+
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data with the keys of a move's; numbers null without a solution."""
         from trajopt import __version__
@@ -153,9 +160,7 @@ class PlantSolution:
         if self.command is None:
             return written
         written.append(directory / "command.csv")
-        rows = zip(self.command.impulses[0], [*self.command.levels, self.command.u_ss], strict=True)
-        lines = [f"# trajopt {self.problem.hash}", "t [s],u", *(f"{t:.17g},{u:.17g}" for t, u in rows)]
-        write_atomically(written[-1], ("\n".join(lines) + "\n").encode())
+        write_atomically(written[-1], self.csv().encode())
         for name, draw in pictures.items():
             figure: Any = draw().figure
             figure.savefig(directory / name, dpi=150)
