@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write beside, flush to disk, then rename: a reader never sees half a file. Raises OSError."""
+def write_atomically(path: Path, content: bytes, accept: Callable[[Path], None] = lambda written: None) -> None:
+    """Write beside, flush to disk, then rename: a reader never sees half a file. Raises OSError.
+
+    ``accept`` may look at what was written before it takes its place; when it raises, nothing is left.
+    """
     handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
+        accept(Path(beside))
         os.chmod(beside, 0o644)
         os.replace(beside, path)
     except BaseException:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from trajopt.export import Report
+
 FORMAT = "trajopt result 1"
 
 
@@ -144,6 +146,13 @@ class Solution:
         from trajopt.plot_arcs import plot_arcs
 
         return plot_arcs(self)
+
+    def export(self, path: str | Path, to: str, **options: Any) -> Report:
+        """Write the move for a drive or controller, verified as the target interpolates it; the formats and options are
+        those of `trajopt.export.export`. Raises NoSolution, BadInput, trajopt.export.Refused, OSError."""
+        from trajopt.export import export
+
+        return export(self, path, to, **options)
 
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data, numbers null where there is no solution."""
