@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from trajopt.trajectory import Trajectory
 
 MOST: Final = 1_000_000  # points of a file
-_SAME: Final = 1e-9  # relative: times closer than this are one
+_SAME: Final = 1e-9  # s, and relative: times closer than this are one
+_ON_A_TICK: Final = 1e-6  # of a tick
 _AT_REST: Final = 1e-9  # of the peak velocity
 
 
@@ -66,9 +67,9 @@ def sample(solution: Solution, form: Format, kind: str, cycle: float | None) -> 
     time = nodes(trajectory, kind) if cycle is None else _every(cycle, duration, form.equidistant)
     if form.tick is not None:
         ticks = np.unique(np.round(time / form.tick))
-        ticks[-1] = np.ceil(duration / form.tick * (1 - _SAME))
+        ticks[-1] = np.ceil(duration / form.tick - _ON_A_TICK)
         time = np.unique(ticks) * form.tick
-    if time[-1] > duration * (1 + _SAME):
+    if time[-1] - duration > max(_SAME * duration, _SAME):
         _refuse_moving_end(solution, form, time[-1])
     within = np.minimum(time, duration)
     within[-1] = duration
