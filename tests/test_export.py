@@ -219,7 +219,7 @@ def test_setpoints_are_integers_up_to_the_cycle_after_the_end(fastest: trajopt.S
 
 
 def test_differences_of_exact_setpoints_keep_every_limit(fastest: trajopt.Solution, tmp_path: Path) -> None:
-    """Each is a mean of the derivative over its points; what breaks limits is the rounding, by 2^(i-1) count/cycle^i."""
+    """Each is a mean of the derivative over its points; rounding breaks limits, by at most 2^(i-1) count/cycle^i."""
     report = fastest.export(tmp_path / "set.csv", "setpoints", cycle="1 ms", resolution=COUNT)
     assert report.verdict == "warned"
     for i, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
@@ -233,7 +233,7 @@ def test_differences_of_exact_setpoints_keep_every_limit(fastest: trajopt.Soluti
 def test_straight_lines_seen_at_the_drives_own_cycle_multiply_the_acceleration(
     fastest: trajopt.Solution, tmp_path: Path
 ) -> None:
-    """A drive of 0.25 ms that draws lines through points of 2 ms sees an eighth of the time for each change of speed."""
+    """A drive of 0.25 ms that draws lines through points of 2 ms has an eighth of the time for a change of speed."""
     options: dict[str, Any] = {"cycle": "2 ms", "resolution": "1 nm"}
     with pytest.raises(Refused) as refused:
         fastest.export(tmp_path / "set.csv", "setpoints", drive_cycle="0.25 ms", **options)
