@@ -22,6 +22,7 @@ _HOMES = {
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",
     "read_result": "trajopt.stored",
+    "compare": "trajopt.plot",
     "Verdict": "trajopt.verdict",
     **dict.fromkeys(
         ("Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Transcription"),

@@ -171,6 +171,23 @@ def export(
 
 
 @app.command()
+def plot(
+    results: Annotated[list[Path], typer.Argument(metavar="RESULT...", help="result.json files, or their folders")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the picture: .png, .pdf or .svg")],
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", help="trajectory, compare, prices, arcs, vibration or torque-speed"),
+    ] = None,
+    labels: Annotated[list[str], typer.Option("--label", help="a name for each, in a comparison")] = [],  # noqa: B006
+) -> None:
+    """Draw written results again: one, or several in comparison."""
+    from trajopt.redraw import redraw
+
+    redraw(results, output, kind, labels)
+    print(f"wrote {output}")
+
+
+@app.command()
 def problems(as_json: AsJson = False) -> None:
     """List the ready-made problems."""
     from trajopt import problem_file

@@ -141,6 +141,13 @@ class Solution:
 
         return plot_vibration(self, frequency, damping)
 
+    def plot_torque_speed(self) -> Axes:
+        """The path in the torque-speed plane, within its limits (see `trajopt.plot_plane`). Raises NoSolution, and
+        BadInput without a load."""
+        from trajopt.plot_plane import plot_torque_speed
+
+        return plot_torque_speed(self)
+
     def plot_arcs(self) -> list[Axes]:
         """When a minimum-time move runs on which limit (see `trajopt.plot_arcs`). Raises NoSolution."""
         from trajopt.plot_arcs import plot_arcs
