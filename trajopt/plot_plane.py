@@ -31,8 +31,7 @@ _GRID: Final = 401  # points a side, on which the allowed region is drawn
 def plot_torque_speed(solution: Solution) -> Axes:
     """Torque (N m, or force, N) over speed (rad/s or m/s): the path from start (disc) to end (square), coloured by
     time; shaded what all limits on velocity, force, power, current, voltage and the envelope allow, the largest where
-    they vary in time; their borders in line styles of
-    their own. The load's own friction and viscous force lie within the torque.
+    they vary in time; their borders in line styles of their own. The load's own friction lies within the torque.
 
     Raises NoSolution, and BadInput for a move without a load.
     """
