@@ -351,6 +351,12 @@ def test_bad_input_is_one_line_with_the_remedy(
     assert not list(tmp_path.iterdir())
 
 
+def test_the_last_cycle_is_never_a_sliver(fastest: trajopt.Solution, tmp_path: Path) -> None:
+    assert fastest.duration is not None
+    report = fastest.export(tmp_path / "z.csv", "xps", cycle=fastest.duration / (20 + 1e-5), allow=True)
+    assert report.points == 21 and abs(row(report, "jerk").peak) < 98.1 * (1 + 1e-6)
+
+
 def test_a_cycle_longer_than_the_move_and_a_folder_are_refused(strained: trajopt.Solution, tmp_path: Path) -> None:
     with pytest.raises(trajopt.BadInput, match="longer than the move, 1 s"):
         strained.export(tmp_path / "f", "csv", cycle="2 s")
@@ -419,6 +425,8 @@ def test_command_line(fastest: trajopt.Solution, tmp_path: Path) -> None:
     assert done.returncode == 2 and "did you mean 'zaber'?" in done.stderr and len(done.stderr.splitlines()) == 1
     done = run("export", result, "--to", "csv", "-o", tmp_path / "none" / "f")
     assert done.returncode == 4 and len(done.stderr.strip().splitlines()) == 1
+    done = run("plot", result, tmp_path / "out", "-o", tmp_path / "two.png", "--label", "a", "--label", "b")
+    assert done.returncode == 0 and (tmp_path / "two.png").read_bytes().startswith(b"\x89PNG")
     edited = json.loads(result.read_text())
     edited["duration"] *= 1 + 1e-12
     result.write_text(json.dumps(edited))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 MOST: Final = 1_000_000  # points of a file
 _SAME: Final = 1e-9  # s, and relative: times closer than this are one
+_SHORTEST: Final = 1e-3  # of a cycle, that the last one may be
 _ON_A_TICK: Final = 1e-6  # of a tick
 _AT_REST: Final = 1e-9  # of the peak velocity
 
@@ -100,6 +101,8 @@ def _every(cycle: float, duration: float, equidistant: bool) -> Floats:
     time: Floats = cycle * np.arange(count + 1, dtype=float)
     if not equidistant:
         time[-1] = duration
+        if count > 1 and time[-1] - time[-2] < _SHORTEST * cycle:  # a polynomial over so little would be rounding
+            time = np.delete(time, -2)
     return time
 
 
