@@ -389,6 +389,19 @@ def test_euler_unsolved_and_altered_solutions_are_never_exported(strained: trajo
     with pytest.raises(trajopt.TrajoptError, match="the checker rejects"):
         altered.export(tmp_path / "f", "csv")
     assert not list(tmp_path.iterdir())
+    impossible.save(tmp_path)
+    with pytest.raises(trajopt.NoSolution, match="IMPOSSIBLE carries no trajectory"):
+        trajopt.read_result(tmp_path)
+
+
+def test_what_is_no_result_of_a_move_is_refused(tmp_path: Path) -> None:
+    trajopt.solve(trajopt.load("two_masses_and_a_spring")).save(tmp_path)
+    with pytest.raises(trajopt.BadInput, match="only the result of a move of an axis"):
+        trajopt.read_result(tmp_path)
+    (tmp_path / "result.json").write_text('{"format": ')
+    for path in (tmp_path / "result.json", tmp_path / "missing.json"):
+        with pytest.raises(trajopt.BadInput, match="give the result.json of a solve"):
+            trajopt.read_result(path)
 
 
 def test_results_read_back_are_the_same(
