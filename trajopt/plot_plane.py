@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from trajopt.solution import Solution
 
 REGION: Final = COLOURS[5]
-TIMES: Final = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.9, 256)))  # even, the same to all eyes
+TIMES: Final = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.75, 256)))  # even, the same to all eyes
 _ROOM: Final = 1.15  # of the plane beyond the path
 _GRID: Final = 401  # points a side, on which the allowed region is drawn
 
