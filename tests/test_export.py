@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from scipy.io import loadmat
 
 import trajopt
 from tests.conftest import axis, solved, table_i
+from trajopt.cli import main
 from trajopt.export import Refused
 from trajopt.export.points import Points
 from trajopt.export.reconstruct import reconstruct
@@ -419,29 +418,31 @@ def test_results_read_back_are_the_same(
             np.testing.assert_allclose(back.at(t)[name], values, atol=1e-9 * scale)
 
 
-def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from trajopt.cli import main; main()", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+def test_command_line(fastest: trajopt.Solution, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(*words: str | Path) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in words])
+        printed = capsys.readouterr()
+        assert "Traceback" not in printed.err
+        return int(str(ended.value.code)), printed.out, printed.err
 
-
-def test_command_line(fastest: trajopt.Solution, tmp_path: Path) -> None:
     fastest.save(tmp_path / "out")
     result, file = tmp_path / "out" / "result.json", tmp_path / "move.csv"
-    done = run("export", result, "--to", "pvt", "--dialect", "zaber", "-o", file)
-    assert done.returncode == 0 and file.exists() and "PASSED" in done.stdout and "jerk" in done.stdout
+    code, out, _ = run("export", result, "--to", "pvt", "--dialect", "zaber", "-o", file)
+    assert code == 0 and file.exists() and "PASSED" in out and "jerk" in out
     file.unlink()
-    done = run("export", result, "--to", "galil", "--resolution", COUNT, "-o", file, "--json")
-    report = json.loads(done.stdout)
-    assert done.returncode == 3 and not file.exists() and report["verdict"] == "refused" and not report["written"]
-    assert {r["name"] for r in report["rows"]} == {"velocity", "acceleration", "jerk"} and "refused:" in done.stderr
-    done = run("export", result, "--to", "zaberr", "-o", file)
-    assert done.returncode == 2 and "did you mean 'zaber'?" in done.stderr and len(done.stderr.splitlines()) == 1
-    done = run("export", result, "--to", "csv", "-o", tmp_path / "none" / "f")
-    assert done.returncode == 4 and len(done.stderr.strip().splitlines()) == 1
-    done = run("plot", result, tmp_path / "out", "-o", tmp_path / "two.png", "--label", "a", "--label", "b")
-    assert done.returncode == 0 and (tmp_path / "two.png").read_bytes().startswith(b"\x89PNG")
+    code, out, error = run("export", result, "--to", "galil", "--resolution", COUNT, "-o", file, "--json")
+    report = json.loads(out)
+    assert code == 3 and not file.exists() and report["verdict"] == "refused" and not report["written"]
+    assert {r["name"] for r in report["rows"]} == {"velocity", "acceleration", "jerk"} and "refused:" in error
+    code, _, error = run("export", result, "--to", "zaberr", "-o", file)
+    assert code == 2 and "did you mean 'zaber'?" in error and len(error.splitlines()) == 1
+    code, _, error = run("export", result, "--to", "csv", "-o", tmp_path / "none" / "f")
+    assert code == 4 and len(error.strip().splitlines()) == 1
+    code, _, _ = run("plot", result, tmp_path / "out", "-o", tmp_path / "two.png", "--label", "a", "--label", "b")
+    assert code == 0 and (tmp_path / "two.png").read_bytes().startswith(b"\x89PNG")
     edited = json.loads(result.read_text())
     edited["duration"] *= 1 + 1e-12
     result.write_text(json.dumps(edited))
-    done = run("export", result, "--to", "csv", "-o", file)
-    assert done.returncode == 3 and "seal: broken" in done.stderr and not file.exists()
+    code, _, error = run("export", result, "--to", "csv", "-o", file)
+    assert code == 3 and "seal: broken" in error and not file.exists()
