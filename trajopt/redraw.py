@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from trajopt.errors import BadInput
 from trajopt.fields import nearest
-from trajopt.files import write_atomically
+from trajopt.files import refuse_folder, write_atomically
 from trajopt.solution import Solution
 from trajopt.stored import read_result
 
@@ -37,8 +37,7 @@ def redraw(results: Sequence[Path], output: Path, kind: str | None = None, label
         raise BadInput(f"label: {kind} has no legend; leave --label out")
     if output.suffix.lower() not in ENDINGS:
         raise BadInput(f"output: a picture ends in one of {', '.join(ENDINGS)}, got {str(output)[-80:]!r}")
-    if output.is_dir():
-        raise BadInput(f"output: {output} is a folder; name a file in it")
+    refuse_folder(output)
     figure = _drawn([read_result(path) for path in results], kind, list(labels) or None).figure
     buffer = io.BytesIO()
     figure.savefig(buffer, format=output.suffix[1:].lower(), dpi=150)

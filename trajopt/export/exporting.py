@@ -14,11 +14,11 @@ from trajopt import checker, units
 from trajopt.errors import BadInput, InternalError, NoSolution, TrajoptError
 from trajopt.export import formats
 from trajopt.export.formats import Format
-from trajopt.export.points import Header, Points, at_rest, sample
+from trajopt.export.points import Header, Points, sample
 from trajopt.export.reconstruct import NEEDS, SMOOTH
 from trajopt.export.verify import Report, verify
 from trajopt.fields import nearest
-from trajopt.files import write_atomically
+from trajopt.files import refuse_folder, write_atomically
 
 if TYPE_CHECKING:
     from trajopt.solution import Solution
@@ -64,44 +64,43 @@ def export(
 
     Raises BadInput, NoSolution, TrajoptError where the checker rejects the solution, Refused, OSError.
     """
-    form = formats.find(to, dialect)
+    form, path = formats.find(to, dialect), Path(path)
     trajectory = _checked(solution)
-    rotary = solution.problem.rotary
-    count = _resolution(resolution, rotary, float(np.ptp(trajectory.chain[0])))
-    if form.counts and count is None:
-        raise BadInput(f'resolution: is missing; {form.name} counts, write for example "0.1 um" or "10000 counts/mm"')
-    if _NAME.fullmatch(name) is None:
-        raise BadInput(f"name: must be letters, digits and _, at most 63, got {name[:80]!r}")
-    period, drive = _seconds(cycle, "cycle"), _seconds(drive_cycle, "drive_cycle")
-    kind = _interpolation(interpolation, form, trajectory.order, period is not None)
-    _refuse_folder(Path(path))
-    exact = sample(solution, form, kind, period)
-    if len(exact.time) > form.most:
-        count = len(exact.time)
-        raise BadInput(f"cycle: {form.name} holds {form.most} points at most, these are {count}; give a longer one")
-    _refuse_drive(drive, exact)
-    if drive is None and period is None and kind not in SMOOTH:
-        drive = min(DRIVE, float(np.max(np.diff(exact.time))))
-    if form.at_rest:
-        exact = at_rest(exact, form)
-    header = Header(name, rotary, trajectory.order, trajectory.origin + float(trajectory.chain[0][0]), period, count,
-                    solution.problem.hash)  # fmt: skip
-    points = _rounded(exact, form, header)
-    content = form.write(points, header)
+    refuse_folder(path)
+    header = _header(solution, form, name, _seconds(cycle, "cycle"), resolution)
+    kind = _interpolation(interpolation, form, trajectory.order, header.cycle is not None)
+    exact = sample(solution, form, kind, header.cycle)
+    drive = _drive(_seconds(drive_cycle, "drive_cycle"), exact, kind, header.cycle is not None)
     found: list[Report] = []
 
     def accept(written: Path) -> None:
-        try:
-            read = form.read(written.read_bytes(), header)
-        except (ValueError, IndexError, KeyError) as error:
-            raise InternalError(f"{form.name}: its own file cannot be read back: {error}") from error
+        read = _read(written, form, header)
         report = verify(form.name, str(path), exact, read, header, trajectory, kind, drive, form.rounds)
         if report.verdict == "refused" and not allow:
             raise Refused(replace(report, written=False))
         found.append(report)
 
-    write_atomically(Path(path), content, accept)
+    write_atomically(path, form.write(_rounded(exact, form, header), header), accept)
     return found[0]
+
+
+def _header(solution: Solution, form: Format, name: str, cycle: float | None, resolution: float | str | None) -> Header:
+    trajectory, problem = solution.trajectory, solution.problem
+    assert trajectory is not None
+    if _NAME.fullmatch(name) is None:
+        raise BadInput(f"name: must be letters, digits and _, at most 63, got {name[:80]!r}")
+    count = _resolution(resolution, problem.rotary, float(np.ptp(trajectory.chain[0])))
+    if form.counts and count is None:
+        raise BadInput(f'resolution: is missing; {form.name} counts, write for example "0.1 um" or "10000 counts/mm"')
+    origin = trajectory.origin + float(trajectory.chain[0][0])
+    return Header(name, problem.rotary, trajectory.order, origin, cycle, count, problem.hash)
+
+
+def _read(written: Path, form: Format, header: Header) -> Points:
+    try:
+        return form.read(written.read_bytes(), header)
+    except (ValueError, IndexError, KeyError) as error:
+        raise InternalError(f"{form.name}: its own file cannot be read back: {error}") from error
 
 
 def _checked(solution: Solution) -> Any:
@@ -174,13 +173,12 @@ def _interpolation(asked: str | None, form: Format, order: int, cyclic: bool) ->
     return kind
 
 
-def _refuse_folder(path: Path) -> None:
-    if path.is_dir():
-        raise BadInput(f"output: {path} is a folder; name a file in it, for example {path / 'move.csv'}")
-
-
-def _refuse_drive(drive: float | None, points: Points) -> None:
+def _drive(drive: float | None, points: Points, kind: str, cyclic: bool) -> float | None:
+    """The drive's own cycle, s: as given, or assumed where it draws straight lines between points at no cycle."""
     apart = float(np.max(np.diff(points.time)))
-    if drive is not None and not points.time[-1] / 1e6 <= drive <= apart * (1 + 1e-9):
+    if drive is None:
+        return min(DRIVE, apart) if kind not in SMOOTH and not cyclic else None
+    if not points.time[-1] / 1e6 <= drive <= apart * (1 + 1e-9):
         raise BadInput(f"drive_cycle: must be at most the points' own distance of {apart:g} s and at least a "
                        f"millionth of the move, got {drive:g} s")  # fmt: skip
+    return drive

@@ -75,7 +75,10 @@ def sample(solution: Solution, form: Format, kind: str, cycle: float | None) -> 
     within = np.minimum(time, duration)
     within[-1] = duration
     values = trajectory.at(within)
-    return Points(time, tuple(values[name] for name in DERIVATIVES[: trajectory.order + 1]))
+    points = Points(time, tuple(values[name] for name in DERIVATIVES[: trajectory.order + 1]))
+    if len(time) > form.most:
+        raise BadInput(f"cycle: {form.name} holds {form.most} points at most, these are {len(time)}; give a longer one")
+    return _at_rest(points, form) if form.at_rest else points
 
 
 def nodes(trajectory: Trajectory, kind: str) -> Floats:
@@ -134,7 +137,7 @@ def _refuse_moving_end(solution: Solution, form: Format, end: float) -> None:
                        f"{form.name} (next: {end:.9g} s); choose a cycle that divides it, or --to csv")  # fmt: skip
 
 
-def at_rest(points: Points, form: Format) -> Points:
+def _at_rest(points: Points, form: Format) -> Points:
     """The points with velocities of exactly zero at both ends, for a format that can only start and stop at rest.
 
     Raises BadInput where the move does not.
