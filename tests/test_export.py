@@ -19,8 +19,9 @@ import trajopt
 from tests.conftest import axis, solved, table_i
 from trajopt.cli import main
 from trajopt.export import Refused
+from trajopt.export.formats import names
 from trajopt.export.points import Points
-from trajopt.export.reconstruct import reconstruct
+from trajopt.export.reconstruct import NEEDS, reconstruct
 from trajopt.export.verify import Report
 
 COUNT = "0.1 um"
@@ -446,3 +447,9 @@ def test_command_line(fastest: trajopt.Solution, tmp_path: Path, capsys: pytest.
     result.write_text(json.dumps(edited))
     code, _, error = run("export", result, "--to", "csv", "-o", file)
     assert code == 3 and "seal: broken" in error and not file.exists()
+
+
+def test_the_documentation_names_every_format_and_its_interpolation() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "exports.md").read_text(encoding="utf-8")
+    assert [name for name in names() if f"`{name}`" not in text] == []
+    assert all(kind in text for kind in NEEDS)
