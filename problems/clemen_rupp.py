@@ -121,7 +121,7 @@ def figures(solutions: Mapping[Case, Solution], directory: Path) -> list[Path]:
         dashed = {label: euler[name] for name, label in TENFOLD.items()} if quantity == "velocity" else {}
         if all(solution.status.solved for solution in (*three.values(), *dashed.values())):
             paths.append(directory / f"fig{number}_{quantity}.png")
-            panels = compare(three, dashed, title=f"Fig. {number}: least {quantity} (Euler scheme)")
+            panels = compare(three, dashed=dashed, title=f"Fig. {number}: least {quantity} (Euler scheme)")
             panels.figure.savefig(paths[-1], dpi=150)
     for number, name in ((5, "time"), (6, "equal_weights")):
         if euler[name].status.solved:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 
 import trajopt
 from tests.conftest import axis, solved, table_i
 from trajopt.plot import COLOURS, SHADE, Panels, compare, curve, plot
+from trajopt.redraw import redraw
 
 QUICK: dict[str, Any] = {"intervals": 40}
 
@@ -232,3 +236,149 @@ def test_pyplot_and_its_global_figures_stay_out() -> None:
     code = "import sys, trajopt.plot; print('matplotlib.figure' in sys.modules, 'matplotlib.pyplot' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["True", "False"]
+
+
+def within(figure: Any) -> None:
+    """Every text of a figure lies within it, and every scale says its unit; a plant's signals have none."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    width, height = canvas.get_width_height()
+    for axes in figure.axes:
+        box = axes.get_tightbbox(canvas.get_renderer())
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1 and box.y1 <= height + 1, axes
+        for scale in (axes.xaxis, axes.yaxis):
+            ticks = [label.get_text() for label in scale.get_ticklabels() if label.get_visible()]
+            named = any(re.match("[a-z]", text) for text in ticks)
+            plain = re.match("input|output|switching", scale.get_label_text())
+            assert "[" in scale.get_label_text() or not ticks or named or plain, (axes, ticks)
+    for legend in figure.legends:
+        box = legend.get_window_extent(canvas.get_renderer())
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1, legend
+
+
+@pytest.fixture(scope="module")
+def motor() -> trajopt.Solution:
+    """A rotary axis with envelope, power limit and a mode to be kept quiet."""
+    return solved(
+        trajopt.from_dict(
+            {
+                "title": "A table that is asked for more than a title of one line can say in a figure of this width",
+                "move": {"time": "0.3 s", "end": {"position": "5 rad"}},
+                "limits": {
+                    "velocity": "300 rpm",
+                    "envelope": {
+                        "speed": ["0 rad/s", "15 rad/s", "40 rad/s"],
+                        "torque": ["2.6 N m", "2.6 N m", "1 N m"],
+                    },
+                    "power": "45 W",
+                },
+                "load": {"inertia": "0.01 kg m^2", "viscous": "1e-3 N m s/rad"},
+                "vibration": [{"frequency": "30 Hz", "damping": 0.02}],
+                "objective": {"minimize": "force", "norm": "l2"},
+                "transcription": {"intervals": 60},
+            }
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def arcs() -> trajopt.Solution:
+    """A snap-limited least time, which chatters."""
+    limits = {"velocity": 1.0, "acceleration": 20.0, "jerk": 1000.0, "snap": 1e5}
+    return solved(axis("time", time="free", distance=0.3, limits=limits))
+
+
+def test_every_figure_keeps_its_texts_within_and_names_its_units(
+    motor: trajopt.Solution, arcs: trajopt.Solution, smooth: trajopt.Solution, strained: trajopt.Solution
+) -> None:
+    for solution in (motor, arcs, strained):
+        within(plot(solution).figure)
+        within(solution.plot_prices().figure)
+        within(solution.plot_vibration().figure)
+    within(arcs.plot_arcs()[0].figure)
+    for solution in (motor, smooth):
+        within(solution.plot_torque_speed().figure)
+    within(trajopt.compare([smooth, strained], ["smooth", "strained"]).figure)
+    command = trajopt.solve(trajopt.load("two_masses_and_a_spring"))
+    within(command.plot()[0].figure)
+    within(command.plot_vibration().figure)
+
+
+def test_compare_takes_a_list_with_labels_and_styles_that_differ_in_print(
+    smooth: trajopt.Solution, strained: trajopt.Solution
+) -> None:
+    panels = trajopt.compare([smooth, strained], ["a", "b"])
+    first, second = curves(panels[1])
+    assert [first.get_label(), second.get_label()] == ["a", "b"]
+    assert first.get_linestyle() != second.get_linestyle() and first.get_color() != second.get_color()
+    assert [line.get_label() for line in curves(trajopt.compare([smooth, smooth])[0])] == [
+        "1: trajectory", "2: trajectory",
+    ]  # fmt: skip
+    for wrong in (["a"], ["a", "a"]):
+        with pytest.raises(ValueError, match="as many different labels"):
+            trajopt.compare([smooth, strained], wrong)
+
+
+def test_an_envelope_is_the_limit_of_torque_at_each_speed(motor: trajopt.Solution) -> None:
+    panels = plot(motor)
+    torque = panels[3]
+    assert torque.get_ylabel().startswith("torque")
+    low, high = limits(torque)
+    time, values = points(high)
+    speed = np.abs(motor.at(time)["velocity"])
+    np.testing.assert_allclose(values, np.interp(speed, [0, 15, 40], [2.6, 2.6, 1.0]), atol=1e-3)
+    np.testing.assert_allclose(points(low)[1], -np.array(values))
+    assert len(torque.patches) >= 1  # shaded where it is active
+
+
+def test_the_plane_shows_the_path_and_shades_what_is_allowed(motor: trajopt.Solution, smooth: trajopt.Solution) -> None:
+    axes = motor.plot_torque_speed()
+    path = next(c for c in axes.collections if isinstance(c, LineCollection) and c.get_array() is not None)
+    segments = np.array(path.get_segments())
+    speed, torque = segments[:, 0, 0], segments[:, 0, 1]
+    expected = motor.at(np.minimum(path.get_array(), 0.3))
+    np.testing.assert_allclose(speed, expected["velocity"], atol=0.3)
+    assert np.max(np.abs(torque)) <= 2.6 * (1 + 1e-6)
+    labelled = {text.get_text() for text in axes.figure.legends[0].get_texts()}
+    assert labelled == {"start", "end", "velocity limit", "power limit", "envelope limit", "within all limits"}
+    assert axes.get_xlabel() == "speed [rad/s]" and axes.get_ylabel() == "torque [N m]"
+    assert smooth.plot_torque_speed().get_ylabel() == "force [N]"
+    bare = solved(axis("jerk", "l2", **QUICK))
+    with pytest.raises(trajopt.BadInput, match=r"load: is missing"):
+        bare.plot_torque_speed()
+
+
+def test_redrawing_written_results(
+    motor: trajopt.Solution,
+    arcs: trajopt.Solution,
+    smooth: trajopt.Solution,
+    strained: trajopt.Solution,
+    tmp_path: Path,
+) -> None:
+    for name, solution in {"motor": motor, "arcs": arcs, "smooth": smooth, "strained": strained}.items():
+        solution.save(tmp_path / name)
+    out = tmp_path / "picture.png"
+    for kind, name in (
+        ("trajectory", "smooth"), ("prices", "strained"), ("arcs", "arcs"), ("vibration", "motor"),
+        ("torque-speed", "motor"), (None, "motor"),
+    ):  # fmt: skip
+        redraw([tmp_path / name], out, kind)
+        assert out.read_bytes().startswith(b"\x89PNG") and len(out.read_bytes()) > 10_000
+        out.unlink()
+    redraw([tmp_path / "smooth", tmp_path / "strained" / "result.json"], tmp_path / "two.svg", labels=["s", "t"])
+    assert b"<svg" in (tmp_path / "two.svg").read_bytes()
+    for arguments, words in (
+        (([tmp_path / "motor"], out, "prizes"), "did you mean 'prices'?"),
+        (([tmp_path / "motor", tmp_path / "arcs"], out, "prices"), "draws one result, got 2"),
+        (([tmp_path / "motor"], tmp_path / "p.gif"), "ends in one of"),
+        (([tmp_path / "motor"], out, None, ["a"]), "leave --label out"),
+        (([tmp_path / "motor", tmp_path / "arcs"], out), "no unit in common"),
+        (([tmp_path / "smooth", tmp_path / "strained"], out, None, ["a"]), "as many different labels"),
+        (([tmp_path / "arcs"], out, "torque-speed"), "load: is missing"),
+        (([tmp_path / "none"], out), "cannot be read"),
+    ):
+        with pytest.raises(trajopt.BadInput, match=re.escape(words)):
+            redraw(*arguments)
+    with pytest.raises(trajopt.NoSolution, match="no arcs"):
+        redraw([tmp_path / "smooth"], out, "arcs")
+    assert not out.exists()

@@ -21,6 +21,8 @@ _HOMES = {
     "check": "trajopt.checker",
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",
+    "read_result": "trajopt.stored",
+    "compare": "trajopt.plot",
     "Verdict": "trajopt.verdict",
     **dict.fromkeys(
         ("Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Transcription"),

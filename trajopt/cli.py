@@ -1,4 +1,4 @@
-"""The command line: ``trajopt solve | study | synchronise | check | route | problems``."""
+"""The command line: ``trajopt solve | study | synchronise | check | export | plot | route | problems``."""
 
 from __future__ import annotations
 
@@ -149,6 +149,65 @@ def check(
         raise BadInput(str(error)) from None
     print(json.dumps(report.to_dict()) if as_json else report.summary())
     raise typer.Exit(0 if report.passed else 3)
+
+
+@app.command()
+def export(
+    result: Annotated[Path, typer.Argument(help="a result.json, or the folder of one")],
+    to: Annotated[str, typer.Option("--to", help="csv, ros, pvt, cam, plcopen, mat, setpoints or a dialect's name")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the file to write")],
+    dialect: Annotated[str | None, typer.Option("--dialect", help="of pvt, cam or plcopen")] = None,
+    cycle: Annotated[str | None, typer.Option("--cycle", help='a point every "1 ms"; else at the nodes')] = None,
+    resolution: Annotated[
+        str | None, typer.Option("--resolution", help='of the encoder: "0.1 um" or "10000 counts/mm"')
+    ] = None,
+    drive_cycle: Annotated[
+        str | None, typer.Option("--drive-cycle", help="of the drive, where it interpolates finer than the points")
+    ] = None,
+    interpolation: Annotated[
+        str | None, typer.Option("--interpolation", help="hold, linear, cubic, quintic or spline, if not the usual one")
+    ] = None,
+    name: Annotated[str, typer.Option("--name", help="of the axis, in the file")] = "axis",
+    allow: Annotated[bool, typer.Option("--allow", help="leave a file that breaks limits on the machine")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a checked result for a drive or controller, verified as that will interpolate it."""
+    from trajopt import stored
+    from trajopt.export import Refused
+    from trajopt.export.printing import print_report
+
+    solution, refused = stored.read_result(result), False
+    try:
+        report = solution.export(
+            output, to, dialect=dialect, cycle=cycle, resolution=resolution, drive_cycle=drive_cycle,
+            interpolation=interpolation, name=name, allow=allow,
+        )  # fmt: skip
+    except Refused as refusal:
+        report, refused = refusal.report, True
+    if as_json:
+        print(json.dumps(report.to_dict(), allow_nan=False))
+    else:
+        print_report(report)
+    for message in report.messages:
+        print(f"{'refused' if refused else 'warning'}: {message}", file=sys.stderr)
+    raise typer.Exit(3 if refused else 0)
+
+
+@app.command()
+def plot(
+    results: Annotated[list[Path], typer.Argument(metavar="RESULT...", help="result.json files, or their folders")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the picture: .png, .pdf or .svg")],
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", help="trajectory, compare, prices, arcs, vibration or torque-speed"),
+    ] = None,
+    labels: Annotated[list[str], typer.Option("--label", help="a name for each, in a comparison")] = [],  # noqa: B006
+) -> None:
+    """Draw written results again: one, or several in comparison."""
+    from trajopt.redraw import redraw
+
+    redraw(results, output, kind, labels)
+    print(f"wrote {output}")
 
 
 @app.command()

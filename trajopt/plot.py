@@ -1,26 +1,23 @@
 """Figures of a solution: stacked panels of position and its derivatives, force and power, with their limits.
 
-One look for every figure: Okabe-Ito colours, which colour-blind readers tell apart and printers keep; limits as thin
-grey dashes; intervals on which a limit is active shaded. Curves are the exact interpolant, not lines between samples.
+The look is that of `trajopt.look`. Curves are the exact interpolant, not lines between samples.
 """
 
 from __future__ import annotations
 
-import io
-import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from math import comb
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from trajopt import motor, units
+from trajopt import look, motor, units
 from trajopt.errors import NoSolution
 from trajopt.fields import Limit
+from trajopt.look import COLOURS, DASHES, GREY, SHADE, SMALL, STYLES, Panels, note, pretty
 from trajopt.mesh import Floats
 from trajopt.problem import DERIVATIVES, FREE
 from trajopt.trajectory import Trajectory
@@ -28,30 +25,13 @@ from trajopt.trajectory import Trajectory
 if TYPE_CHECKING:
     from trajopt.solution import Solution
 
-COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe-Ito
-SHADE: Final = "#F0E442"  # its yellow: too light for a line
-GREY: Final = "0.35"
+__all__ = ["COLOURS", "GREY", "SHADE", "Panels", "compare", "curve", "plot", "plot_prices", "plot_vibration"]
+
 POINTS: Final = 4000  # about as many samples a curve, shared among the intervals
 ACTIVE: Final = 1e-6  # of the limit: closer than this, for longer than an interval, it is active
 ACTIVE_LOAD: Final = 1e-3  # the same for force and power: at a limit they sag between nodes, by the curvature of a step
 _ELECTRICAL: Final = ("current", "voltage", "electrical_power")
 IN_VIEW: Final = 1.6  # times the height of the curves: a limit farther off is named instead of shown
-
-
-class Panels(list[Axes]):
-    """The axes, top panel first. A notebook shows their figure."""
-
-    @property
-    def figure(self) -> Figure:
-        """The figure they belong to."""
-        figure = self[0].figure
-        assert isinstance(figure, Figure)
-        return figure
-
-    def _repr_png_(self) -> bytes:
-        buffer = io.BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=110)
-        return buffer.getvalue()
 
 
 def plot(solution: Solution) -> Panels:
@@ -67,16 +47,16 @@ def plot(solution: Solution) -> Panels:
     panels = _panels(names, trajectory)
     for axes, name in zip(panels, names, strict=True):
         time, values = curve(trajectory, name)
-        limit = _limit(trajectory, name)
-        if limit is not None:
-            close = _close(time, values, limit, ACTIVE if name in DERIVATIVES else ACTIVE_LOAD)
+        sides = _sides(trajectory, name, time)
+        if sides:
+            close = _close(values, sides, ACTIVE if name in DERIVATIVES else ACTIVE_LOAD)
             top = name == DERIVATIVES[trajectory.order]
             _shade(axes, time, close, shortest=(0.99 if top else 1.5) * float(np.min(np.diff(trajectory.time))))
         axes.plot(time, values, color=COLOURS[0], linewidth=1.6, label=name)
         _finish(axes, name, [trajectory])
     _mark_arcs(panels, solution.structure)
-    _title(panels, solution.problem.title or "Trajectory", pad=18)
-    _note(panels[0], f"minimised {pretty(objective_text(solution))}", "left", 8)
+    look.title(panels[0], solution.problem.title or "Trajectory", pad=18)
+    note(panels[0], f"minimised {pretty(objective_text(solution))}", "left", SMALL)
     return panels
 
 
@@ -89,17 +69,17 @@ def plot_prices(solution: Solution) -> Axes:
 
     _moved(solution)
     rows = [price for price in reversed(solution.prices) if price["per_percent"]]
-    figure = Figure(figsize=(7.0, 1.2 + 0.4 * max(len(rows), 1)), layout="constrained")
-    axes = figure.subplots()
+    axes = look.panels(1, 1.2 + 0.4 * max(len(rows), 1))[0]
+    axes.grid(False)
     values = [100 * row["per_percent"] for row in rows]
-    bars = axes.barh([row["name"] for row in rows], values, color=COLOURS[0], height=0.6)
-    axes.bar_label(bars, labels=[f"{value:+.3g} %" for value in values], padding=4, fontsize=9)
+    names = [pretty(solution.problem.shown(row["name"])) for row in rows]
+    bars = axes.barh(names, values, color=COLOURS[0], height=0.6)
+    axes.bar_label(bars, labels=[f"{value:+.3g} %" for value in values], padding=4, fontsize=SMALL)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.margins(x=0.2)
-    axes.set_xlabel(f"change of {objective_label(solution)} [%] for 1 % more")
-    axes.set_title(solution.problem.title or "Prices", loc="left", fontweight="bold")
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
+    axes.set_xlabel(f"change of {pretty(objective_label(solution))} [%] for 1 % more", fontsize=SMALL)
+    look.title(axes, solution.problem.title or "Prices")
+    axes.spines["left"].set_visible(False)
     axes.tick_params(left=False)
     return axes
 
@@ -121,45 +101,63 @@ def plot_vibration(solution: Solution, frequency: Any = None, damping: float | N
     if damping is None:
         damping = asked[0].damping if asked else 0.0
     stroke = float(np.max(np.abs(trajectory.chain[0] - trajectory.chain[0][0]))) or 1.0
-    figure = Figure(figsize=(7.0, 3.4), layout="constrained", facecolor="white")
-    axes = figure.subplots()
-    axes.semilogy(frequency, np.maximum(residual(trajectory, frequency, damping) / stroke, 1e-9), color=COLOURS[0])
+    axes = look.panels(1, 3.4)[0]
+    left = np.maximum(residual(trajectory, frequency, damping) / stroke, 1e-9)
+    axes.semilogy(frequency, left, color=COLOURS[0], linewidth=1.6)
     for band in bands:
         axes.axvspan(*band, color=SHADE, alpha=0.6, linewidth=0 if band[0] < band[1] else 3)
-    axes.set_xlabel("natural frequency of the mode [Hz]")
-    axes.set_ylabel("amplitude left / stroke")
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.set_title(solution.problem.title or "Residual vibration", loc="left", fontweight="bold", fontsize=11)
+    if bands:
+        note(axes, "shaded: asked to be quiet", "right", 7)
+    axes.set_xlim(0.0, float(np.max(frequency)))
+    axes.set_xlabel(f"natural frequency of the mode [Hz], damping ratio {damping:.3g}", fontsize=SMALL)
+    axes.set_ylabel("amplitude left / stroke [1]", fontsize=SMALL)
+    look.title(axes, solution.problem.title or "Residual vibration")
     return axes
 
 
 def compare(
-    solutions: Mapping[str, Solution], dashed: Mapping[str, Solution] | None = None, title: str = ""
+    solutions: Mapping[str, Solution] | Sequence[Solution],
+    labels: Sequence[str] | None = None,
+    *,
+    dashed: Mapping[str, Solution] | None = None,
+    title: str = "",
 ) -> Panels:
-    """The same panels with several solutions, named in a legend; ``dashed`` ones take the same colours again.
+    """The same panels with several solutions, named in a legend by ``labels`` (by their titles where there are none);
+    ``dashed`` ones take the same colours again.
 
-    Raises NoSolution when one of them has no trajectory, ValueError when there is none at all.
+    Raises NoSolution when one of them has no trajectory, ValueError when there is none at all or labels do not fit.
     """
     if not solutions:
         raise ValueError("needs at least one solution to compare")
-    solid = {label: _moved(solution) for label, solution in solutions.items()}
+    given = solutions if isinstance(solutions, Mapping) else _labelled(solutions, labels)
+    solid = {label: _moved(solution) for label, solution in given.items()}
     second = {label: _moved(solution) for label, solution in (dashed or {}).items()}
     shown = [*solid.values(), *second.values()]
     present = {name for trajectory in shown for name in _names(trajectory)}
     names: list[str] = [name for name in (*DERIVATIVES, "force", "power", *_ELECTRICAL) if name in present]
     panels = _panels(names, shown[0])
+    styles = ["solid"] if second else STYLES
     for axes, name in zip(panels, names, strict=True):
-        for style, group in (("solid", solid), ((0, (3, 1.2)), second)):
-            looks = zip(cycle(COLOURS), _widths(len(group)), group.items(), strict=False)
-            for colour, width, (label, trajectory) in looks:
+        for group, drawn in ((solid, styles), (second, [(0, (3, 1.2))])):
+            looks = zip(cycle(COLOURS), cycle(drawn), _widths(len(group)), group.items(), strict=False)
+            for colour, style, width, (label, trajectory) in looks:
                 if name in _names(trajectory):
                     axes.plot(*curve(trajectory, name), color=colour, linestyle=style, linewidth=width, label=label)
         _finish(axes, name, shown)
     _legend(panels, len(solid), len(second))
     if title:
-        _title(panels, title, pad=8)
+        look.title(panels[0], title, pad=SMALL)
     return panels
+
+
+def _labelled(solutions: Sequence[Solution], labels: Sequence[str] | None) -> dict[str, Solution]:
+    """Solutions by label; equal titles get numbers."""
+    if labels is None:
+        titles = [solution.problem.title or "trajectory" for solution in solutions]
+        labels = [f"{k}: {t}" if titles.count(t) > 1 else t for k, t in enumerate(titles, start=1)]
+    if len(labels) != len(solutions) or len(set(labels)) != len(labels):
+        raise ValueError(f"needs as many different labels as solutions, got {len(labels)} for {len(solutions)}")
+    return dict(zip(labels, solutions, strict=True))
 
 
 def _widths(count: int) -> list[float]:
@@ -219,30 +217,24 @@ def _names(trajectory: Trajectory) -> list[str]:
 def _panels(names: list[str], trajectory: Trajectory) -> Panels:
     """Empty stacked axes that share the time axis, with units in their labels."""
     kinds = units.kinds(trajectory.problem.rotary)
-    figure = Figure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained", facecolor="white")
-    panels = Panels(figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0])
+    panels = look.panels(len(names), 1.0 + 1.35 * len(names), share=True)
     for axes, name in zip(panels, names, strict=True):
-        axes.set_ylabel(f"{kinds[name].name}\n[{pretty(kinds[name].unit)}]", fontsize=8)
-        axes.tick_params(labelsize=8, color=GREY)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.spines[["left", "bottom"]].set_color(GREY)
-        axes.grid(color="0.92", linewidth=0.7)
-        axes.set_axisbelow(True)
-    panels[-1].set_xlabel("time [s]", fontsize=8)
-    figure.align_ylabels(panels)
+        axes.set_ylabel(f"{kinds[name].name}\n[{pretty(kinds[name].unit)}]", fontsize=SMALL)
+    panels[-1].set_xlabel("time [s]", fontsize=SMALL)
+    panels.figure.align_ylabels(panels)
     return panels
 
 
-def _title(panels: Panels, text: str, pad: float) -> None:
-    panels[0].set_title("\n".join(textwrap.wrap(text, 70)), loc="left", fontsize=11, fontweight="bold", pad=pad)
-
-
-def pretty(unit: str) -> str:
-    return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
-
-
-def _limit(trajectory: Trajectory, name: str) -> Limit | None:
-    return trajectory.problem.limits.given().get(name)
+def _sides(trajectory: Trajectory, name: str, time: Floats) -> list[Floats]:
+    """The limits of a signal at times (s): of a force also what the torque-speed envelope leaves at that speed."""
+    limit: Limit | None = trajectory.problem.limits.given().get(name)
+    sides = [] if limit is None else [side for side in limit.at(time) if side is not None]
+    envelope = trajectory.problem.limits.envelope
+    if name == "force" and envelope is not None:
+        speed = np.abs(np.interp(time, *curve(trajectory, "velocity")))
+        left = np.interp(speed, envelope.speed, envelope.force)
+        sides += [-left, left]
+    return sides
 
 
 def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
@@ -257,7 +249,7 @@ def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
             if (key := time.tobytes() + values.tobytes()) in drawn:
                 continue
             drawn[key] = None
-            axes.plot(time, values, color=GREY, linewidth=0.9, linestyle=(0, (6, 3)), label="_limit", zorder=1.5)
+            axes.plot(time, values, color=GREY, linewidth=0.9, linestyle=DASHES, label="_limit", zorder=1.5)
             within = values[(values >= lowest - room) & (values <= highest + room)]
             low, high = min([low, *within]), max([high, *within])
             if not len(within):
@@ -267,7 +259,7 @@ def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
     axes.set_xlim(0.0, max(trajectory.duration for trajectory in trajectories))
     if far:
         unit = pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
-        _note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
+        note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
 
 
 def _numbers(values: list[float]) -> str:
@@ -275,13 +267,6 @@ def _numbers(values: list[float]) -> str:
     if len(values) == 2 and values[0] == -values[1]:
         return f"±{abs(values[0]):.4g}"
     return ", ".join(f"{x:.4g}" for x in values)
-
-
-def _note(axes: Axes, text: str, side: Literal["left", "right"], size: float) -> None:
-    """A line of small print above a panel."""
-    x = 0.0 if side == "left" else 1.0
-    axes.annotate(text, (x, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", ha=side, va="bottom",
-                  fontsize=size, color=GREY)
 
 
 def _reach(axes: Axes) -> tuple[float, float]:
@@ -292,17 +277,16 @@ def _reach(axes: Axes) -> tuple[float, float]:
 
 def _limit_lines(trajectory: Trajectory, name: str) -> list[tuple[Floats, Floats]]:
     """(time, value) of the lower and the upper limit, with every corner."""
-    limit = _limit(trajectory, name)
-    if limit is None:
-        return []
-    inside = [t for t in limit.breakpoints if 0 < t < trajectory.duration]
-    time = np.unique([0.0, *inside, trajectory.duration])
-    return [(time, side) for side in limit.at(time) if side is not None]
+    limit: Limit | None = trajectory.problem.limits.given().get(name)
+    corners = () if limit is None else limit.breakpoints
+    time = np.unique([0.0, *(t for t in corners if 0 < t < trajectory.duration), trajectory.duration])
+    if name == "force" and trajectory.problem.limits.envelope is not None:
+        time = np.unique([*time, *curve(trajectory, "velocity")[0]])
+    return [(time, side) for side in _sides(trajectory, name, time)]
 
 
-def _close(time: Floats, values: Floats, limit: Limit, relative: float) -> NDArray[np.bool_]:
+def _close(values: Floats, sides: list[Floats], relative: float) -> NDArray[np.bool_]:
     """Which samples lie at a limit, within a fraction of its size."""
-    sides = [side for side in limit.at(time) if side is not None]
     size = max(float(np.max(np.abs(side))) for side in sides) or 1.0
     return np.asarray(np.any([np.abs(values - side) <= relative * size for side in sides], axis=0))
 

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
-from trajopt import units
+from trajopt import look, units
 from trajopt.errors import NoSolution
-from trajopt.plot import COLOURS, GREY, Panels
+from trajopt.look import COLOURS, SMALL, Panels
 from trajopt.problem import DERIVATIVES
 
 if TYPE_CHECKING:
     from trajopt.solution import Solution
 
-SIDES: Final = {"max": COLOURS[0], "min": COLOURS[1]}
+SIDES: Final = {"max": (COLOURS[0], ""), "min": (COLOURS[1], "////")}
 
 
 def plot_arcs(solution: Solution) -> Panels:
@@ -29,19 +29,15 @@ def plot_arcs(solution: Solution) -> Panels:
     if not arcs:
         raise NoSolution("the solution has no arcs: it was not found by its switching times")
     chatters = bool(solution.structure.get("chatters"))
-    figure = Figure(figsize=(7.0, 5.2 if chatters else 2.8), layout="constrained", facecolor="white")
-    panels = Panels(figure.subplots(2 if chatters else 1, 1, squeeze=False)[:, 0])
+    panels = look.panels(2 if chatters else 1, 5.2 if chatters else 2.8)
     _timeline(panels[0], arcs, solution.structure.get("touches", ()))
-    panels[0].set_title(solution.problem.title or "Arcs", loc="left", fontweight="bold", fontsize=11)
+    look.title(panels[0], solution.problem.title or "Arcs")
     if chatters:
         top = DERIVATIVES[solution.problem.order]
         unit = units.kinds(solution.problem.rotary)[top].unit
-        _towards_the_cruise(panels[1], arcs, f"{top} [{unit}]")
+        _towards_the_cruise(panels[1], arcs, f"{top} [{look.pretty(unit)}]")
     handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
-    for axes in panels:
-        axes.tick_params(labelsize=8, color=GREY)
-        axes.spines[["top", "right"]].set_visible(False)
+    panels.figure.legend(*handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
     return panels
 
 
@@ -50,15 +46,17 @@ def _timeline(axes: Axes, arcs: list[dict[str, Any]], touches: Any) -> None:
     rows = {name: k for k, name in enumerate(reversed(shown))}
     for arc in arcs:
         name, _, side = arc["limit"].partition(".")
-        axes.barh(rows[name], arc["to"] - arc["from"], left=arc["from"], height=0.7, color=SIDES[side], linewidth=0)
-    for touch in touches:
-        name = touch["limit"].partition(".")[0]
-        if name in rows:
-            axes.plot(touch["time"], rows[name], "o", color="black", markerfacecolor="white", markersize=4)
-    for side, colour in SIDES.items():
-        axes.barh(0, 0.0, color=colour, label=f"on the {side}imum")
+        colour, hatch = SIDES[side]
+        axes.barh(rows[name], arc["to"] - arc["from"], left=arc["from"], height=0.7, color=colour, hatch=hatch,
+                  edgecolor="white", linewidth=0)  # fmt: skip
+    touched = [(t["time"], rows[name]) for t in touches if (name := t["limit"].partition(".")[0]) in rows]
+    for side, (colour, hatch) in SIDES.items():
+        axes.barh(0, 0.0, color=colour, hatch=hatch, edgecolor="white", label=f"on the {side}imum")
+    if touched:
+        axes.plot(*zip(*touched, strict=True), "o", color="black", markerfacecolor="white", markersize=4, label="touch")
+    axes.grid(False)
     axes.set_yticks(list(rows.values()), list(rows))
-    axes.set_xlabel("time [s]", fontsize=8)
+    axes.set_xlabel("time [s]", fontsize=SMALL)
     axes.set_xlim(0.0, arcs[-1]["to"])
 
 
@@ -75,7 +73,8 @@ def _towards_the_cruise(axes: Axes, arcs: list[dict[str, Any]], label: str) -> N
     axes.set_xscale("log")
     if cruise:
         axes.invert_xaxis()
-    axes.set_xlabel(f"time {'left until' if cruise else 'since'} the cruise [s], logarithmic", fontsize=8)
-    axes.set_ylabel(label, fontsize=8)
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.set_axisbelow(True)
+    axes.set_xlabel(f"time {'left until' if cruise else 'since'} the cruise [s], logarithmic", fontsize=SMALL)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if away[0] < 300 * away[-1] else (1.0,)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylabel(label, fontsize=SMALL)

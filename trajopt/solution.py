@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from trajopt.export import Report
+
 FORMAT = "trajopt result 1"
 
 
@@ -145,11 +147,25 @@ class Solution:
 
         return plot_vibration(self, frequency, damping)
 
+    def plot_torque_speed(self) -> Axes:
+        """The path in the torque-speed plane, within its limits (see `trajopt.plot_plane`). Raises NoSolution, and
+        BadInput without a load."""
+        from trajopt.plot_plane import plot_torque_speed
+
+        return plot_torque_speed(self)
+
     def plot_arcs(self) -> list[Axes]:
         """When a minimum-time move runs on which limit (see `trajopt.plot_arcs`). Raises NoSolution."""
         from trajopt.plot_arcs import plot_arcs
 
         return plot_arcs(self)
+
+    def export(self, path: str | Path, to: str, **options: Any) -> Report:
+        """Write the move for a drive or controller, verified as the target interpolates it; the formats and options are
+        those of `trajopt.export.export`. Raises NoSolution, BadInput, trajopt.export.Refused, OSError."""
+        from trajopt.export import export
+
+        return export(self, path, to, **options)
 
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data, numbers null where there is no solution."""

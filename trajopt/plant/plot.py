@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import textwrap
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from trajopt import look
+from trajopt.look import COLOURS, DASHES, GREY, SHADE, SMALL, Panels
 from trajopt.plant.command import Command
-from trajopt.plot import COLOURS, GREY, SHADE, Panels
 
 if TYPE_CHECKING:
     from trajopt.plant.solution import PlantSolution
 
 _AFTER: Final = 0.2  # of the duration: shown of the rest
-_DASHES: Final = (0, (6, 3))
 _LABELS: Final = {"input": "input u", "output": "output y", "sigma": "switching\nfunction σ"}
 
 
@@ -25,8 +23,7 @@ def plot(solution: PlantSolution) -> Panels:
     """Stacked panels of input with its limits, output with its final value, and switching function, positive arcs of
     the input shaded. Raises NoSolution."""
     command = solution._found()
-    figure = Figure(figsize=(7.0, 5.4), layout="constrained", facecolor="white")
-    panels = Panels(figure.subplots(3, 1, sharex=True))
+    panels = look.panels(3, 5.4, share=True)
     rest = command.duration * _AFTER
     time = np.sort([*np.linspace(0.0, command.duration + rest, 1200), *command.switches, command.duration])
     values = solution.at(time)
@@ -38,19 +35,15 @@ def plot(solution: PlantSolution) -> Panels:
         else:
             axes.plot(time, values[name], color=COLOURS[0], linewidth=1.6)
         for limit in {"input": (command.umin, command.umax), "output": (command.y_f,), "sigma": (0.0,)}[name]:
-            axes.axhline(limit, color=GREY, linewidth=0.9, linestyle=_DASHES, zorder=1.5)
+            axes.axhline(limit, color=GREY, linewidth=0.9, linestyle=DASHES, zorder=1.5)
         axes.axvline(command.duration, color=GREY, linewidth=0.7)
-        axes.set_ylabel(label, fontsize=8)
-        _finish(axes)
+        axes.set_ylabel(label, fontsize=SMALL)
     panels[-1].set_xlim(-0.02 * command.duration, command.duration + rest)
-    panels[-1].set_xlabel("time [s]", fontsize=8)
-    figure.align_ylabels(panels)
-    title = solution.problem.title or "Minimum-time command"
-    panels[0].set_title("\n".join(textwrap.wrap(title, 70)), loc="left", fontsize=11, fontweight="bold", pad=18)
+    panels[-1].set_xlabel("time [s]", fontsize=SMALL)
+    panels.figure.align_ylabels(panels)
+    look.title(panels[0], solution.problem.title or "Minimum-time command", pad=18)
     count = len(command.switches)
-    note = f"least time {command.duration:.9g} s, {count} switch{'es' * (count != 1)}"
-    panels[0].annotate(note, (0.0, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", va="bottom",
-                       fontsize=8, color=GREY)
+    look.note(panels[0], f"least time {command.duration:.9g} s, {count} switch{'es' * (count != 1)}", "left", SMALL)
     return panels
 
 
@@ -67,18 +60,15 @@ def plot_vibration(solution: PlantSolution, frequency: Any = None, damping: floa
         frequency = np.linspace(top / 1000, top, 1000)
     if damping is None:
         damping = abs(marked[0].real) / abs(marked[0]) if marked else 0.0
-    figure = Figure(figsize=(7.0, 3.4), layout="constrained", facecolor="white")
-    axes = figure.subplots()
+    axes = look.panels(1, 3.4)[0]
     axes.plot(frequency, solution.residual_vibration(frequency, damping), color=COLOURS[0], linewidth=1.6)
     for p in marked:
-        axes.axvline(abs(p) / (2 * pi), color=COLOURS[1], linewidth=0.9, linestyle=_DASHES)
+        axes.axvline(abs(p) / (2 * pi), color=COLOURS[1], linewidth=0.9, linestyle=DASHES)
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(0.0, float(np.max(frequency)))
-    axes.set_xlabel(f"undamped frequency of the mode [Hz], damping ratio {damping:.3g}", fontsize=8)
-    axes.set_ylabel("vibration left [%]", fontsize=8)
-    _finish(axes)
-    title = solution.problem.title or "Residual vibration"
-    axes.set_title("\n".join(textwrap.wrap(title, 70)), loc="left", fontsize=11, fontweight="bold")
+    axes.set_xlabel(f"undamped frequency of the mode [Hz], damping ratio {damping:.3g}", fontsize=SMALL)
+    axes.set_ylabel("vibration left [%]", fontsize=SMALL)
+    look.title(axes, solution.problem.title or "Residual vibration")
     return axes
 
 
@@ -87,11 +77,3 @@ def _shade(axes: Axes, command: Command) -> None:
     for start, end, level in zip(ends, ends[1:], command.levels, strict=False):
         if level == command.umax:
             axes.axvspan(float(start), float(end), facecolor=SHADE, alpha=0.25, linewidth=0, zorder=0.5)
-
-
-def _finish(axes: Axes) -> None:
-    axes.tick_params(labelsize=8, color=GREY)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.set_axisbelow(True)

@@ -13,11 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from trajopt.plot import COLOURS, GREY, pretty
+from trajopt.look import COLOURS, GREY, SMALL, STYLES, dress, pretty
 from trajopt.study.plan import Plan, Plot
 
 _MARKERS: Final = "os^Dv<>"
-_DASHES: Final = ("solid", (0, (5, 1.5)), (0, (1.5, 1)), (0, (5, 1, 1, 1)))
 _DECADE: Final = 30.0  # a range wider than this is shown on a logarithmic scale
 _NONE: Final = "no move"
 
@@ -40,10 +39,10 @@ def figure(plot: Plot, table: pd.DataFrame, title: str) -> Figure:
         for axes, (_, rows) in zip(axes_row, groups, strict=True):
             _draw(axes, plot, rows, y, table)
         _scale(axes_row[0], table, y)
-        axes_row[0].set_ylabel(_words(_heading(table, y)), fontsize=8)
+        axes_row[0].set_ylabel(_words(_heading(table, y)), fontsize=SMALL)
     for top, bottom, (label, _) in zip(grid[0], grid[-1], groups, strict=True):
         top.set_title(label, fontsize=9, loc="left")
-        bottom.set_xlabel(_words(_heading(table, plot.x)), fontsize=8)
+        bottom.set_xlabel(_words(_heading(table, plot.x)), fontsize=SMALL)
     _legend(drawn, grid[0][0])
     drawn.suptitle(title or "Study", x=0.01, ha="left", fontsize=11, fontweight="bold")
     return drawn
@@ -56,16 +55,12 @@ def _draw(axes: Axes, plot: Plot, rows: pd.DataFrame, y: str, table: pd.DataFram
         here = curve.loc[curve.index.intersection(rows.index)].sort_values(abscissa)
         style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "marker": _MARKERS[i % len(_MARKERS)]}
         values = _values(here, y)
-        axes.plot(here[abscissa], values, markersize=4, linewidth=1.4, linestyle=_DASHES[i % len(_DASHES)],
+        axes.plot(here[abscissa], values, markersize=4, linewidth=1.4, linestyle=STYLES[i % len(STYLES)],
                   label=label or None, **style)  # fmt: skip
     missing = rows.loc[~np.isfinite(_values(rows, y)), abscissa].drop_duplicates()
     axes.plot(missing, np.full(len(missing), 0.03), "x", color=GREY, markersize=5, transform=axes.get_xaxis_transform(),
               label=_NONE)  # fmt: skip
-    axes.tick_params(labelsize=8, color=GREY)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.set_axisbelow(True)
+    dress(axes)
 
 
 def _values(rows: pd.DataFrame, y: str) -> Any:
@@ -78,7 +73,7 @@ def _scale(axes: Axes, table: pd.DataFrame, y: str) -> None:
     values = _values(table, y)
     values = values[np.isfinite(values)]
     if not len(values):
-        axes.text(0.5, 0.5, f"no case has {y}", ha="center", transform=axes.transAxes, fontsize=8)
+        axes.text(0.5, 0.5, f"no case has {y}", ha="center", transform=axes.transAxes, fontsize=SMALL)
     elif values.min() > 0 and values.max() > _DECADE * values.min():
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -113,7 +108,7 @@ def _heading(table: pd.DataFrame, name: str) -> str:
 
 def _words(heading: str) -> str:
     """A heading for people: ``RMS force [N]``, ``peak torque [N m]``."""
-    words = pretty(heading).replace("_", " ").replace("rms ", "RMS ")
+    words = pretty(heading).replace("rms ", "RMS ")
     return words.replace("force", "torque") if "[N m]" in heading else words
 
 
@@ -126,4 +121,4 @@ def _legend(drawn: Figure, axes: Axes) -> None:
         handles.pop(_NONE, None)
     if handles:
         drawn.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=min(len(handles), 5),
-                     frameon=False, fontsize=8)  # fmt: skip
+                     frameon=False, fontsize=SMALL)  # fmt: skip
