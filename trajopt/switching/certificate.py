@@ -53,8 +53,9 @@ def reach_beyond(
     conditions: Sequence[Condition],
     prices: Sequence[float],
 ) -> tuple[float, ...]:
-    """How far beyond its end any move could get at most, as duration, for any ends: the coefficients of a polynomial of
-    the share of the duration that it takes, for shares up to one; none when the multipliers show nothing.
+    """How far beyond its end any move could get at most, for any ends, forwards or, where the price of the distance is
+    negative, backwards: the coefficients of a polynomial of the share of the duration that it takes, for shares up to
+    one; none when the multipliers show nothing.
 
     Where it is negative no move is possible. Zero at one proves an extremal: the duration is the border of possible
     ones.
@@ -73,19 +74,23 @@ def reach_beyond(
         beyond[i] += first[i] * chain.start[i] - last[i] * chain.end[i]
     for power, term in _terms(chain, masses, sum(durations)):
         beyond[power] += term
-    return tuple(price * x for x in beyond)
+    return tuple(beyond)
 
 
-def first_possible(beyond: Sequence[float], low: float) -> float:
-    """The least share of the duration, from ``low`` on, that such a polynomial leaves possible; one if none is."""
+def impossible(beyond: Sequence[float], low: float) -> tuple[float, float]:
+    """The uppermost interval of shares of the duration, from ``low`` to one, in which such a polynomial is negative;
+    (low, low) where there is none."""
     if not all(map(isfinite, beyond)) or not beyond:
-        return low
+        return low, low
     roots = real_roots([c * factorial(k) for k, c in enumerate(beyond)])
     marks = [low, *sorted(x for x in roots if low < x < 1), 1.0]
-    for a, b in zip(marks, marks[1:], strict=False):
-        if sum(c * ((a + b) / 2) ** k for k, c in enumerate(beyond)) >= 0:
-            return a
-    return 1.0
+    found: list[tuple[float, float]] = []
+    for a, b in zip(marks[-2::-1], marks[:0:-1], strict=True):
+        if sum(c * ((a + b) / 2) ** k for k, c in enumerate(beyond)) < 0:
+            found.append((a, b))
+        elif found:
+            break
+    return (found[-1][0], found[0][1]) if found else (low, low)
 
 
 def _price(active: Sequence[str], conditions: Sequence[Condition], prices: Sequence[float]) -> float:

@@ -7,6 +7,7 @@ from math import inf, isfinite
 
 from trajopt.switching.chain import Arcs, Chain, Unresolved, back_in_time
 from trajopt.switching.coarse import Grid
+from trajopt.switching.cover import ruled_out
 from trajopt.switching.from_third import sketches
 from trajopt.switching.low import normalised, shortest_low
 from trajopt.switching.refine import EXTREMAL, Verified, as_arcs, refined, with_more_touches
@@ -15,6 +16,7 @@ _GRIDS = (60, 90, 120, 170)  # intervals, the first of them to find the duration
 _SHORTEST, _LONGEST, _GROWTH = 0.2, 200.0, 1.1  # of the normalised time: where the first possible duration is sought
 _CLOSE = 1e-3  # relative: width of the bracket from which the structure is read
 _ROUNDS = 3  # touches added at each end of a plateau of velocity
+_SAME = 1e-11  # relative: durations that rounding tells apart
 _NEAR = 0.02  # relative: a structure this much longer than the coarse move is not that of the coarse move
 
 
@@ -36,9 +38,18 @@ def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arc
         found += filter(allowed, _from_grids(scaled, floor, rounds, allowed))
     if not found:
         raise Unresolved("no structure that a coarse program shows could be verified")
-    best = min(found, key=lambda one: one.duration)
-    lowest = max(one.lowest(floor) for one in found)
-    return back_in_time(as_arcs(best, min(lowest, best.duration)), units, time)
+    least = min(one.duration for one in found) * (1 + _SAME)
+    best = max((one for one in found if one.duration <= least), key=lambda one: one.dwell)
+    lowest = min(_bound(scaled, floor, found), best.duration)
+    return back_in_time(as_arcs(best, lowest), units, time)
+
+
+def _bound(chain: Chain, floor: float, found: list[Verified]) -> float:
+    """A lower bound on the least duration: ``floor``, or where the multipliers of a sequence rule out those between."""
+    low, high = max((one.impossible(floor) for one in found), key=lambda span: span[1])
+    if low > floor and (low_enough := ruled_out(chain, floor, low)) < low:
+        return low_enough
+    return high
 
 
 def _from_third_order(chain: Chain, rounds: int) -> list[Verified]:

@@ -7,15 +7,16 @@ from functools import cached_property
 from itertools import accumulate
 from math import fsum, inf
 
-from trajopt.switching.certificate import first_possible, reach_beyond
+from trajopt.switching.certificate import impossible, reach_beyond
 from trajopt.switching.chain import NAMES, Arcs, Chain
 from trajopt.switching.coarse import Sketch
+from trajopt.switching.multipliers import multipliers
 from trajopt.switching.polynomials import Audit, audit
-from trajopt.switching.repair import with_limit, with_touches, without_shortest
-from trajopt.switching.stationary import Condition, prices_of, shortest_sequence
+from trajopt.switching.repair import endings, with_limit, with_touches, without_shortest
+from trajopt.switching.stationary import Condition, shortest_sequence
 
 EXTREMAL = 1e-10  # relative gap
-_CUT_OFF = 1e-5  # the same where chattering was cut off
+_CUT_OFF = 1e-8  # the same where chattering was cut off
 _REPAIRS = 8
 _SHARES = (1.0, 0.7, 0.4, 0.2)  # of the jerk of a self-similar touch, where a new one is begun
 
@@ -31,16 +32,20 @@ class Verified:
     @cached_property
     def gap(self) -> float:
         """The duration by which it may be short of an extremal; infinite when the multipliers show nothing."""
-        return max(0.0, fsum(self.beyond)) if self.beyond else inf
+        rate = sum(k * c for k, c in enumerate(self.beyond)) / self.duration
+        return max(0.0, fsum(self.beyond)) / rate if rate > 0 else inf
 
     @property
     def is_extremal(self) -> bool:
-        """But for chattering that was cut off, which leaves a gap far above the loss of duration."""
+        """But for chattering that was cut off."""
         return self.gap <= (_CUT_OFF if self.chatters else EXTREMAL) * self.duration
 
-    def lowest(self, floor: float) -> float:
-        """A lower bound on the least duration, where another is ``floor``."""
-        return self.duration * first_possible(self.beyond, floor / self.duration) if floor < self.duration else floor
+    def impossible(self, floor: float) -> tuple[float, float]:
+        """Durations between which no move is possible, nor below ``floor``."""
+        if floor >= self.duration:
+            return floor, floor
+        low, high = impossible(self.beyond, floor / self.duration)
+        return max(low * self.duration, floor), high * self.duration
 
     @property
     def duration(self) -> float:
@@ -67,20 +72,22 @@ def with_more_touches(chain: Chain, found: Verified, rounds: int) -> list[Verifi
         if chain.order < 4 or out[-1].gap <= EXTREMAL * out[-1].duration:
             break
         again = _more_touches(chain, out[-1].sketch)
-        if again is None or again.duration >= out[-1].duration:
+        if again is None or (again.duration >= out[-1].duration and again.gap >= out[-1].gap):
             break
         out.append(again)
     return out
 
 
 def _more_touches(chain: Chain, sketch: Sketch) -> Verified | None:
-    """With a touch more beside each plateau of velocity: first with its jerk prescribed, then freed."""
+    """With a touch more beside each plateau of velocity, or at one end of one: first with its jerk prescribed, then
+    freed."""
     for share in _SHARES:
-        if (more := with_touches(chain, sketch, share)) is None:
-            return None
-        conditions = [*_conditions(chain, more[0]), *more[1]]
-        if (pinned := _solved(chain, more[0], conditions, True)) and (found := refined(chain, pinned, True)):
-            return found
+        every = endings(chain, sketch, share)
+        for some in [every, *([e] for e in every if len(every) > 1)]:
+            more, jerks = with_touches(sketch, some)
+            pinned = _solved(chain, more, [*_conditions(chain, more), *jerks], True) if some else None
+            if pinned and (found := refined(chain, pinned, True)):
+                return found
     return None
 
 
@@ -95,15 +102,22 @@ def refined(chain: Chain, sketch: Sketch, local: bool) -> Verified | None:
             sketch = smaller
             continue
         sketch = solved
-        tops, durations, active = zip(*((p.top, p.duration, p.active) for p in sketch.pieces), strict=True)
-        verdict = audit(chain, tops, durations)
+        verdict = audit(chain, [p.top for p in sketch.pieces], [p.duration for p in sketch.pieces])
         if verdict.accepted:
-            prices = prices_of((0.0, *chain.start[1:]), tops, conditions, durations)
-            return Verified(sketch, verdict, reach_beyond(chain, active, durations, conditions, prices))
+            return Verified(sketch, verdict, _beyond(chain, sketch))
         if (held := with_limit(chain, sketch, verdict.worst)) is None:
             return None
         sketch = held
     return None
+
+
+def _beyond(chain: Chain, sketch: Sketch) -> tuple[float, ...]:
+    active, durations = [p.active for p in sketch.pieces], [p.duration for p in sketch.pieces]
+    touched = {(t.arcs, t.derivative + 1) for t in sketch.touches}
+    conditions = [c for c in _conditions(chain, sketch) if (c.arcs, c.derivative) not in touched]
+    prices = multipliers(chain.order, active, durations, conditions)
+    ways = (reach_beyond(chain, active, durations, conditions, [way * p for p in prices]) for way in (1.0, -1.0))
+    return min(ways, key=fsum)
 
 
 def _solved(chain: Chain, sketch: Sketch, conditions: list[Condition], local: bool) -> Sketch | None:
