@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import factorial, inf
+from math import factorial, inf, isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -88,12 +88,9 @@ def forwards(problem: Problem) -> Problem:
     if plain or not rests or move.fixed_time is not None or ends[0][0] == ends[1][0]:
         return problem
     low, high = _pair(problem.limits.velocity)
-    ahead = {"min": 0.0} if ends[1][0] > ends[0][0] else {"max": 0.0}
-    if "min" in ahead and high < inf:
-        ahead["max"] = high
-    if "max" in ahead and low > -inf:
-        ahead["min"] = low
-    limits = problem.limits.model_copy(update={"velocity": Limit(**ahead)})
+    sides = {"min": 0.0, "max": high} if ends[1][0] > ends[0][0] else {"min": low, "max": 0.0}
+    velocity = Limit(**{side: x for side, x in sides.items() if isfinite(x)})
+    limits = problem.limits.model_copy(update={"velocity": velocity})
     return problem.model_copy(update={"limits": limits})
 
 
