@@ -32,6 +32,7 @@ STORE: Final = Path(__file__).parents[1] / ".soak"
 SPECS: Final = 20_000
 PLANTS: Final = 300
 CHAINS: Final = 200_000
+SNAPS: Final = 20
 _BATCH: Final = 500  # chains a task
 MOST_UNDECIDED: Final = 1e-3  # of well-posed convex specs
 PATIENCE: Final = 600.0  # s without any answer: the workers hang
@@ -52,6 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not options.show and not options.seeds:
         summary["plants"] = _stage(test_plant_random.fault, options.plants, options.workers)
         batches = -(-options.chains // _BATCH)
+        summary["snaps"] = _stage(test_switching.snap_fault, options.snaps, options.workers)
         summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
     _print(summary, console)
     if not options.show:
@@ -59,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
         path = STORE / f"seed{options.seed}_{len(records)}.json"
         path.write_text(json.dumps(summary, indent=1))
         console.print(f"written: {path}")
-    faults = any(summary.get(stage, {}).get("faults") for stage in ("plants", "chains"))
+    faults = any(summary.get(stage, {}).get("faults") for stage in ("plants", "chains", "snaps"))
     return int(summary["fatal"] > 0 or summary["undecided_share"] > MOST_UNDECIDED or faults)
 
 
@@ -72,6 +74,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
     parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
+    parser.add_argument("--snaps", type=int, default=SNAPS, help="hundreds of fourth-order moves with moving ends (20)")
     parser.add_argument("--chains", type=int, default=CHAINS, help="how many least times against Ruckig's (200000)")
     parser.add_argument("--seeds", type=int, nargs="+", help="only the specs of these seeds")
     parser.add_argument("--show", action="store_true", help="print each spec, judged here with every comparison")
@@ -229,7 +232,11 @@ def _print(summary: dict[str, Any], console: Console) -> None:
     for failure in summary["failures"]:
         for why in failure["why"]:
             console.print(f"seed {failure['seed']} {failure['status']}: {why}", highlight=False, markup=False)
-    stages = {"plants": "linear plants, not solved and proven", "chains": "least times, unlike Ruckig's"}
+    stages = {
+        "plants": "linear plants, not solved and proven",
+        "chains": "least times, unlike Ruckig's",
+        "snaps": "hundreds of fourth-order moves with moving ends, not proven to a millionth",
+    }
     for stage, words in stages.items():
         if stage in summary:
             faults = summary[stage]["faults"]
