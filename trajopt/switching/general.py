@@ -1,4 +1,4 @@
-"""Any chain: structure from a coarse linear program, switching times by Newton, verdict, repair."""
+"""Any chain: structure from the third order or a coarse linear program, switching times by Newton, verdict, repair."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ _GRIDS = (60, 90, 120, 170)  # intervals, the first of them to find the duration
 _SHORTEST, _LONGEST, _GROWTH = 0.2, 200.0, 1.1  # of the normalised time: where the first possible duration is sought
 _CLOSE = 1e-3  # relative: width of the bracket from which the structure is read
 _ROUNDS = 3  # touches added at each end of a plateau of velocity
+OPEN, CUT_OFF = 1e-9, 1e-7  # relative: a loss that only a wrong structure leaves, and where chattering is cut off
 _SAME = 1e-11  # relative: durations that rounding tells apart
 _NEAR = 0.02  # relative: a structure this much longer than the coarse move is not that of the coarse move
 
@@ -34,22 +35,28 @@ def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arc
 
     rounds = _ROUNDS if touches is None else touches
     found = list(filter(allowed, _from_third_order(scaled, rounds)))
-    if not any(one.is_extremal for one in found):
+    best, lowest = _judged(scaled, floor, found)
+    cut = touches is not None or min_dwell > 0
+    if best is None or (not cut and lowest < best.duration * (1 - (CUT_OFF if best.chatters else OPEN))):
         found += filter(allowed, _from_grids(scaled, floor, rounds, allowed))
-    if not found:
-        raise Unresolved("no structure that a coarse program shows could be verified")
-    least = min(one.duration for one in found) * (1 + _SAME)
-    best = max((one for one in found if one.duration <= least), key=lambda one: one.dwell)
-    lowest = min(_bound(scaled, floor, found), best.duration)
+        best, lowest = _judged(scaled, floor, found)
+    if best is None:
+        raise Unresolved("no structure that a third-order move or a coarse program shows could be verified")
     return back_in_time(as_arcs(best, lowest), units, time)
 
 
-def _bound(chain: Chain, floor: float, found: list[Verified]) -> float:
-    """A lower bound on the least duration: ``floor``, or where the multipliers of a sequence rule out those between."""
-    low, high = max((one.impossible(floor) for one in found), key=lambda span: span[1])
-    if low > floor and (low_enough := ruled_out(chain, floor, low)) < low:
-        return low_enough
-    return high
+def _judged(chain: Chain, floor: float, found: list[Verified]) -> tuple[Verified | None, float]:
+    """The shortest sequence, and a lower bound on the least duration: ``floor``, or where the multipliers of one rule
+    out those between."""
+    if not found:
+        return None, floor
+    least = min(one.duration for one in found) * (1 + _SAME)
+    best = max((one for one in found if one.duration <= least), key=lambda one: one.dwell)
+    spans = [one.impossible(floor) for one in found]
+    low, high = max((span for span in spans if span[1] <= least), key=lambda span: span[1], default=(floor, floor))
+    if low > floor and (reached := ruled_out(chain, floor, low)) < low:
+        high = reached
+    return best, min(high, best.duration)
 
 
 def _from_third_order(chain: Chain, rounds: int) -> list[Verified]:

@@ -6,13 +6,9 @@ from dataclasses import replace
 
 from trajopt.switching.chain import NAMES, Arcs, Chain, Unresolved
 from trajopt.switching.doomed import refuse_doomed
-from trajopt.switching.general import shortest_general
+from trajopt.switching.general import CUT_OFF, OPEN, shortest_general
 from trajopt.switching.low import OutOfRange, shortest_low
 from trajopt.switching.snap import between_rests
-
-_OPEN = 1e-9  # relative: a loss that only a wrong structure leaves
-_CUT_OFF = 1e-7  # the same where chattering is cut off
-
 
 def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -> Arcs:
     """The verified arcs of least duration.
@@ -38,7 +34,7 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
     if not chain.at_rest:
         return _either_way(chain, min_dwell, touches, None)
     arcs = between_rests(chain, min_dwell, touches)
-    if arcs.loss > _OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
+    if arcs.loss > OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
         arcs = replace(_either_way(chain, min_dwell, touches, arcs), ordinary=arcs.ordinary)
     return arcs
 
@@ -56,7 +52,7 @@ def _either_way(chain: Chain, min_dwell: float, touches: int | None, best: Arcs 
         shorter = arcs if best is None or arcs.duration < best.duration else best
         lowest = max(arcs.lowest, best.lowest if best else 0.0)
         best = replace(shorter, lowest=min(lowest, shorter.duration))
-        if best.loss <= (_CUT_OFF if best.chatters else _OPEN):
+        if min_dwell or touches is not None or best.loss <= (CUT_OFF if best.chatters else OPEN):
             break
     if best is None:
         assert failure is not None
