@@ -10,6 +10,7 @@ from trajopt.switching.general import CUT_OFF, OPEN, shortest_general
 from trajopt.switching.low import OutOfRange, shortest_low
 from trajopt.switching.snap import between_rests
 
+
 def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -> Arcs:
     """The verified arcs of least duration.
 
