@@ -424,7 +424,7 @@ def _contradictions() -> Iterator[Bad]:
     yield _set("free-and-changing-mass", *free, mass, words=("move.time", "inertia that varies"))
     yield from _vibrations()
     yield _set("one-sided-snap", 'limits.snap=["0 m/s^4","1e4 m/s^4"]', words=("limits.snap: [0, 10000] lets", "grow"))
-    down = ('limits.snap=["-1e4 m/s^4","0 m/s^4"]', "move.end.jerk=2 m/s^3")
+    down = ('limits={jerk="98 m/s^3", snap=["-1e4 m/s^4","0 m/s^4"]}', "move.end.jerk=2 m/s^3")
     yield _set("snap-of-one-sign", *down, words=("limits.snap: [-10000, 0] lets", "only fall", "from 0 to 2"))
     rub = ("limits.force=5 N", "load.coulomb=6 N")
     yield _set("friction-above-force", *rub, words=("limits.force: 5 N", "load.coulomb = 6 N", "raise it"))
