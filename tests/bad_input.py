@@ -423,6 +423,13 @@ def _contradictions() -> Iterator[Bad]:
     mass = 'load={mass={time=["0 s","1 s"], value=["1 kg","2 kg"]}}'
     yield _set("free-and-changing-mass", *free, mass, words=("move.time", "inertia that varies"))
     yield from _vibrations()
+    yield _set("one-sided-snap", 'limits.snap=["0 m/s^4","1e4 m/s^4"]', words=("limits.snap: [0, 10000] lets", "grow"))
+    down = ('limits={jerk="98 m/s^3", snap=["-1e4 m/s^4","0 m/s^4"]}', "move.end.jerk=2 m/s^3")
+    yield _set("snap-of-one-sign", *down, words=("limits.snap: [-10000, 0] lets", "only fall", "from 0 to 2"))
+    rub = ("limits.force=5 N", "load.coulomb=6 N")
+    yield _set("friction-above-force", *rub, words=("limits.force: 5 N", "load.coulomb = 6 N", "raise it"))
+    one = ("limits.torque=0.1 N m", "load.coulomb=0.2 N m", "objective.minimize=energy")
+    yield _set("friction-above-torque", *one, words=("limits.torque: 0.1 N m", "load.coulomb = 0.2"), text=ROTARY)
     for name, value in (("falls", '["2 s","1 s"]'), ("equal", '["1 s","1 s"]'), ("zero", '["0 s","1 s"]')):
         yield _set(f"time-range-{name}", f"move.time={value}", words=("move.time: needs 0 < min < max", "got min"))
     yield _set("time-of-three", 'move.time=["1 s","2 s","3 s"]', words=("move.time: needs one time", "3 values"))

@@ -38,12 +38,14 @@ STORE: Final = Path(__file__).parents[1] / ".soak"
 SPECS: Final = 20_000
 PLANTS: Final = 300
 CHAINS: Final = 200_000
+SNAPS: Final = 20
 _BATCH: Final = 500  # chains a task
 CASES: Final = 10_000
 KILLS: Final = 200
 STAGES: Final = {
     "plants": "linear plants, not solved and proven",
     "chains": "least times, unlike Ruckig's",
+    "snaps": "hundreds of fourth-order moves with moving ends, not proven to a millionth",
     "studies": "cases of a study with poison in it, ended otherwise than they had to",
     "kills": "kills of a study, in rounds that lost something",
 }
@@ -71,6 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not options.seeds and not stopped and summary["specs"] == len(seeds):
         summary["plants"] = _stage(test_plant_random.fault, options.plants, options.workers)
         batches = -(-options.chains // _BATCH)
+        summary["snaps"] = _stage(test_switching.snap_fault, options.snaps, options.workers)
         summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
         summary["studies"] = study_soak.poison(options.cases, options.workers)
         summary["kills"] = study_soak.killed(options.kills)
@@ -142,6 +145,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 8), help="processes")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop submitting after so long")
     parser.add_argument("--plants", type=int, default=PLANTS, help="how many linear plants after the specs (300)")
+    parser.add_argument("--snaps", type=int, default=SNAPS, help="hundreds of fourth-order moves with moving ends (20)")
     parser.add_argument("--chains", type=int, default=CHAINS, help="how many least times against Ruckig's (200000)")
     parser.add_argument("--cases", type=int, default=CASES, help="how many cases of a study with poison in it (10000)")
     parser.add_argument("--kills", type=int, default=KILLS, help="how many kills of a study (200)")

@@ -116,12 +116,14 @@ def kills(study: Path, folder: Path, count: int, seed: int) -> dict[str, Any]:
     line = [sys.executable, "-m", "tests.study_faults", str(study), str(folder)]
     for _ in range(count):
         running = subprocess.Popen(line, stdout=subprocess.PIPE, text=True)
-        time.sleep(draw.uniform(0.3, 1.6))
+        assert running.stdout is not None
+        said = [running.stdout.readline() for _ in range(draw.choice((0, 1, 2)))]  # before it looks, before it has any
+        time.sleep(draw.uniform(0.0, 0.8))
         if draw.random() < 0.5:
             _kill_a_worker(running.pid, draw)
             time.sleep(draw.uniform(0.0, 0.3))
         running.kill()
-        found, kept = _said(running.communicate()[0])
+        found, kept = _said("".join(said) + running.communicate()[0])
         lost += max(announced - found, 0) if found is not None else 0
         announced = max(announced, found or 0) + kept
     found, _ = _said(subprocess.run(line, capture_output=True, text=True, check=True).stdout)

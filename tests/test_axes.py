@@ -24,6 +24,17 @@ def test_the_slowest_sets_the_time_and_the_other_relaxes() -> None:
     assert relaxed.at(relaxed.duration)["position"] == pytest.approx(0.05)
 
 
+def test_the_common_time_is_possible_for_all() -> None:
+    """The running axis can do 0.9 s to 1.28344 s, and again from 3.11709 s; the other needs 2 s at least."""
+    limits = {"velocity": 1.2, "acceleration": 1.0, "jerk": 5.0}
+    ends = {"start": {"velocity": 1.0}, "end": {"velocity": 1.0}}
+    running = axis("jerk", "l2", distance=1.0, limits=limits, intervals=60, **ends)
+    slow = axis("jerk", "l2", distance=1.0, limits={"velocity": 0.6, "acceleration": 4.0, "jerk": 60.0}, intervals=60)
+    found = trajopt.synchronise([running, slow])
+    assert all(solution.status.solved for solution in found)
+    assert found[0].duration == found[1].duration == pytest.approx(3.117, rel=2e-3)
+
+
 def test_an_impossible_axis_keeps_its_verdict() -> None:
     possible = axis("jerk", "l2", distance=0.1, limits=LIMITS, intervals=20)
     blocked = axis("jerk", "l2", distance=2.0, limits=LIMITS | {"position": (-1.0, 2.0)}, intervals=20)

@@ -209,11 +209,52 @@ def test_time_may_run_backwards() -> None:
     assert trajopt.check(second.to_dict(), strict=True).passed
 
 
-def test_a_stiff_snap_limit_with_moving_ends_keeps_a_bound_in_continuous_time() -> None:
+def test_a_stiff_snap_limit_with_moving_ends_is_exact() -> None:
     limits = {"velocity": 1.0, "acceleration": 2.0, "jerk": 20.0, "snap": 5e4}
     ends: dict[str, Any] = {"start": {"velocity": 0.3}, "end": {"velocity": -0.4}}
     stiff = solved(shortest(1.5, limits=limits, intervals=80, **ends))
     third = solved(shortest(1.5, limits={k: x for k, x in limits.items() if k != "snap"}, **ends))
-    assert stiff.certificate["lower_bound"] == pytest.approx(third.duration, rel=1e-9)
-    assert third.duration <= stiff.duration <= third.duration * 1.02
+    assert stiff.route.model == "arcs"
+    assert stiff.certificate["lower_bound"] == pytest.approx(stiff.duration, rel=1e-8)
+    assert third.duration < stiff.duration <= third.duration * 1.001
     assert trajopt.check(stiff.to_dict()).passed
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("jerk", [None, 60.0])
+def test_friction_gives_no_reason_to_turn_back(way: float, jerk: float | None) -> None:
+    """Between rests the least time of both directions is that of one."""
+    limits: dict[str, Any] = {"velocity": 1.0, "force": 20.0} | ({"jerk": jerk} if jerk else {})
+    load = {"inertia": 4.0, "coulomb": 4.0}
+    both = solved(shortest(0.5 * way, limits=limits, load=load))
+    one = solved(shortest(0.5 * way, limits=limits | {"velocity": (0.0, 1.0) if way > 0 else (-1.0, 0.0)}, load=load))
+    assert both.route.model == "arcs" and both.duration == pytest.approx(one.duration, rel=1e-12)
+    assert both.certificate["gap"] < 1e-8
+    assert trajopt.check(both.to_dict(), strict=True).passed
+
+
+RUNNING = {"velocity": 1.0}
+RUN: dict[str, Any] = {  # possible from 0.9 s to 1.28344 s, and again from 3.11709 s
+    "distance": 1.0,
+    "limits": {"velocity": 1.2, "acceleration": 1.0, "jerk": 5.0},
+    "start": RUNNING,
+    "end": RUNNING,
+    "intervals": 60,
+}
+
+
+@pytest.mark.parametrize(
+    ("time", "least"),
+    [((0.5, 2.0), 0.9), ((0.5, 9.0), 0.9), ((1.1, 5.0), 1.1), ((2.0, 5.0), 3.11709), ((4.0, 5.0), 4.0)],
+)
+def test_a_range_around_blocked_times(time: tuple[float, float], least: float) -> None:
+    solution = solved(axis("time", time=time, **RUN))
+    assert solution.duration == pytest.approx(least, rel=2e-3) and solution.duration >= least * (1 - 1e-5)
+    assert solution.certificate["gap"] < 1e-6
+
+
+@pytest.mark.parametrize("time", [(0.3, 0.8), (1.5, 3.0)])
+def test_a_range_of_blocked_times(time: tuple[float, float]) -> None:
+    solution = trajopt.solve(axis("time", time=time, **RUN))
+    assert solution.status in (Verdict.IMPOSSIBLE, Verdict.IMPOSSIBLE_ON_GRID) and solution.duration is None
+    assert solution.explanation["text"]

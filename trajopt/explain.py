@@ -79,7 +79,7 @@ def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
     """The least time on this mesh and, where its switching times are found, in continuous time; where the axis cannot
     wait at an end, every interval of possible times."""
     problem = setting.problem
-    if problem.move.via or any(limit.varies for limit in problem.limits.given().values()) or _free_ends(problem):
+    if problem.move.via or any(limit.varies for limit in problem.limits.given().values()) or has_free_ends(problem):
         return {"least_time": None}
     move = problem.move.model_copy(update={"time": FREE})
     free = replace(setting, problem=problem.model_copy(update={"move": move}))  # the objective decides the order
@@ -90,9 +90,15 @@ def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
     if problem.can_wait:
         attempt = minimum_time(free, clock)
         return found | {"least_time": attempt.trajectory.duration * (1 + ROUND) if attempt.trajectory else None}
-    near = [] if chain is None or chain.order > 3 else _borders(chain)
-    possible = feasible_times(free, clock, near)
+    possible = possible_times(free, clock)
     return found | {"least_time": possible[0][0] if possible else None, "possible_times": possible}
+
+
+def possible_times(setting: Setting, clock: Clock) -> list[tuple[float, float | None]]:
+    """The intervals of durations in which a move with moving ends is possible on its mesh, s."""
+    timed = Objective(terms=(Term(minimize="time"),))
+    chain = as_chain(setting.problem.model_copy(update={"objective": timed}))
+    return feasible_times(setting, clock, [] if chain is None or chain.order > 3 else _borders(chain))
 
 
 def _shortest(chain: Chain) -> float | None:
@@ -137,7 +143,7 @@ def explain_power(setting: Setting, clock: Clock) -> dict[str, Any] | None:
     return found | {"text": text}
 
 
-def _free_ends(problem: Problem) -> bool:
+def has_free_ends(problem: Problem) -> bool:
     return FREE in (problem.move.start.position, problem.move.end.position)
 
 
@@ -145,7 +151,7 @@ def _reachable(setting: Setting, clock: Clock) -> list[float] | None:
     """[nearest, farthest] displacement of the end in the asked time, m or rad, each moved inwards by a millionth; None
     where no end can be reached, or where the start or the end is free."""
     move = setting.problem.move
-    if _free_ends(setting.problem) or move.fixed_time is None:
+    if has_free_ends(setting.problem) or move.fixed_time is None:
         return None
     ends = [farthest(setting, move.fixed_time, sign, clock) for sign in (-1.0, 1.0)]
     if any(attempt.trajectory is None for attempt in ends):

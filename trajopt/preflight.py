@@ -28,6 +28,7 @@ def refuse_contradictions(problem: Problem) -> None:
     for where, state in _states(problem):
         _within_limits(problem, where, state)
     _doomed(problem)
+    _one_sided_snap(problem)
     refuse_weak_motor(problem)
 
 
@@ -214,6 +215,22 @@ def _doomed(problem: Problem) -> None:
                 continue
             for sign in (1.0, -1.0):  # against the upper limit, then mirrored against the lower
                 _brake(problem, where, i, here, there.get(i + 1), direction, sign)
+
+
+def _one_sided_snap(problem: Problem) -> None:
+    """Refuse a snap limit of one sign that the jerks at both ends contradict."""
+    snap, (start, end) = problem.limits.snap, (state.fixed(4) for _, state in _states(problem)[:2])
+    if snap is None or 3 not in start or 3 not in end or snap.lowest < 0 < snap.highest:
+        return
+    change = end[3] - start[3]
+    stays = not change and not any(state.get(i, 1.0) for state in (start, end) for i in (1, 2, 3))
+    moves = 0 in start and 0 in end and start[0] != end[0]
+    if (stays and moves) or (change < 0 <= snap.lowest) or (change > 0 >= snap.highest):
+        only = "grow" if snap.lowest >= 0 else "fall"
+        raise ValueError(
+            f"limits.snap: {_interval(snap.lowest, snap.highest)} lets the jerk only {only}, and it must go from"
+            f" {start[3]:.6g} to {end[3]:.6g}{' by way of others' if stays else ''}; give it a limit of either sign"
+        )
 
 
 def _brake(

@@ -19,6 +19,7 @@ _JUDGED: Final = ("current", "voltage", "envelope")
 def refuse_weak_motor(problem: Problem) -> None:
     """Raise ValueError for a motor that cannot overcome friction, reach the speed of the move, or be fast enough."""
     limits, move = problem.limits, problem.move
+    _refuse_little_force(problem)
     if not any(getattr(limits, name) is not None for name in _JUDGED):
         return
     _ends(problem)
@@ -39,6 +40,20 @@ def refuse_weak_motor(problem: Problem) -> None:
             _speed(problem, way, slowest, "the least speed of limits.velocity")
     if start.get(1) == end.get(1) == 0.0 and isinstance(problem.load.inertia, float):
         _duration(problem, way, distance, duration)
+
+
+def _refuse_little_force(problem: Problem) -> None:
+    """Raise ValueError for a force limit that cannot set the axis off from rest, or anywhere against friction."""
+    force, (start, end) = problem.limits.force, (state.fixed(2) for state in (problem.move.start, problem.move.end))
+    if force is None or 0 not in start or 0 not in end or start[0] == end[0] or start.get(1) != 0.0:
+        return
+    most, coulomb = force.highest if end[0] > start[0] else -force.lowest, problem.load.coulomb
+    if coulomb and most <= coulomb * (1 - _ROUNDING):
+        kinds = units.kinds(problem.rotary)["force"]
+        raise ValueError(
+            f"limits.{problem.shown('force')}: {most:.6g} {kinds.unit} at most in the direction of the move cannot set"
+            f" it off against load.coulomb = {coulomb:.6g} {kinds.unit}; raise it"
+        )
 
 
 def _ends(problem: Problem) -> None:

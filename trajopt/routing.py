@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Problem
 from trajopt.quantities import FORCES, is_affine
-from trajopt.switching_times import as_chain
+from trajopt.switching_times import as_chain, forwards
 
 if TYPE_CHECKING:
     from trajopt.plant.problem import PlantProblem
@@ -70,6 +70,7 @@ def route_on_mesh(problem: Problem) -> Route:
 
 def _lean(problem: Problem) -> Problem:
     """The problem without the limits that are tried without first."""
+    problem = forwards(problem)
     limits = problem.limits.model_copy(update=dict.fromkeys(nonaffine_limits(problem)))
     return problem.model_copy(update={"limits": limits})
 
@@ -80,12 +81,18 @@ def nonaffine_limits(problem: Problem) -> list[str]:
 
 
 def is_time_search(problem: Problem) -> bool:
-    """Whether the problem is minimum time over moves that can wait: a search over fixed-time convex programs.
+    """Whether the problem is minimum time as a search over fixed-time convex programs.
 
-    Feasibility is monotone in the duration when one end is at rest: the axis can wait there.
+    Feasibility is monotone in the duration when one end is at rest: the axis can wait there. Elsewhere a range can be
+    searched where the durations that are possible are known.
     """
     only_time = [term.minimize for term in problem.objective.terms] == ["time"]
-    return problem.move.fixed_time is None and only_time and problem.can_wait
+    return problem.move.fixed_time is None and only_time and (problem.can_wait or _knows_possible_times(problem))
+
+
+def _knows_possible_times(problem: Problem) -> bool:
+    in_range = isinstance(problem.move.time, tuple) and problem.order <= 3 and problem.limits.position is None
+    return in_range and as_chain(_lean(problem)) is not None
 
 
 def has_power_bound(problem: Problem) -> bool:

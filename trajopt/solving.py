@@ -21,7 +21,7 @@ from trajopt.quantities import is_affine
 from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
 from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
-from trajopt.switching_times import as_chain, fastest, floor
+from trajopt.switching_times import as_chain, fastest, floor, forwards
 from trajopt.ties import break_tie, tied_route
 from trajopt.tighten import tighten
 from trajopt.time_search import minimum_time
@@ -82,7 +82,8 @@ def _solve(problem: Problem, clock: Clock) -> Solution:
 
 def _by_arcs(setting: Setting, chosen: Route, clock: Clock) -> Solution:
     """Minimum time by switching times; UNDECIDED where they are not found, or a limit left out is broken."""
-    lean = without(setting, nonaffine_limits(setting.problem))
+    ahead = replace(setting, problem=forwards(setting.problem))
+    lean = without(ahead, nonaffine_limits(ahead.problem))
     chain = as_chain(lean.problem)
     assert chain is not None
     try:

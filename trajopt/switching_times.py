@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import factorial, inf
+from math import factorial, inf, isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -21,8 +21,8 @@ from trajopt.mesh import Floats, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.outer import is_impossible
 from trajopt.prices import ranked
-from trajopt.problem import DERIVATIVES, FREE, Problem, State
-from trajopt.switching import Arcs, Chain, Impossible, Unresolved, shortest
+from trajopt.problem import DERIVATIVES, Problem, State
+from trajopt.switching import Arcs, Chain, Impossible, Unresolved, feasible_durations, shortest
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
 
@@ -35,13 +35,13 @@ _BESIDE: Final = 8  # uniform nodes beside the switches, for the proof
 def as_chain(problem: Problem) -> Chain | None:
     """The chain of integrators that a problem of minimum time is; None where it is more than that.
 
-    It takes constant limits on derivatives up to a limited top one, given states at both ends, and a force limit where
-    the force is an acceleration in disguise.
+    Its duration is free, if only in a range. It takes constant limits on derivatives up to a limited top one, given
+    states at both ends, and a force limit where the force is an acceleration in disguise.
     """
     move, limits = problem.move, problem.limits.given()
     kinematic = limits.keys() <= {*DERIVATIVES, "force"}
     more = move.via or problem.vibration or problem.transcription.scheme != "exact" or not kinematic
-    timed = move.time == FREE and [term.minimize for term in problem.objective.terms] == ["time"]
+    timed = move.fixed_time is None and [term.minimize for term in problem.objective.terms] == ["time"]
     if more or not timed or any(limit.varies for limit in limits.values()):
         return None
     accelerations = _acceleration(problem)
@@ -74,6 +74,41 @@ def _acceleration(problem: Problem) -> tuple[float, float] | None:
     return (low, high) if low < 0 < high else None
 
 
+def forwards(problem: Problem) -> Problem:
+    """The problem with velocities of one direction only, where that costs no time: friction and a force limit between
+    two rests, up to third order.
+
+    A move that turns back within the limits can be replaced by one that does not and is nowhere slower: before each
+    turn it brakes to a rest as soft as the jerk limit allows, waits, and later sets off from there to meet it again.
+    """
+    move, load = problem.move, problem.load
+    ends = [state.fixed(problem.order) for state in (move.start, move.end)]
+    rests = all(set(range(problem.order)) <= state.keys() and not any(map(state.get, range(1, 4))) for state in ends)
+    plain = not load.coulomb or problem.limits.force is None or problem.one_way or problem.order > 3
+    if plain or not rests or move.fixed_time is not None or ends[0][0] == ends[1][0]:
+        return problem
+    low, high = _pair(problem.limits.velocity)
+    sides = {"min": 0.0, "max": high} if ends[1][0] > ends[0][0] else {"min": low, "max": 0.0}
+    velocity = Limit(**{side: x for side, x in sides.items() if isfinite(x)})
+    limits = problem.limits.model_copy(update={"velocity": velocity})
+    return problem.model_copy(update={"limits": limits})
+
+
+def next_possible(chain: Chain, low: float, high: float) -> tuple[float, float] | None:
+    """A part of a range of durations in which the least possible one lies, and above it none that is not, for a chain
+    up to third order without position limits; None if the range holds none at all."""
+    last = 0.0
+    for begin, end in feasible_durations(chain):
+        if begin > high:
+            return None
+        if begin <= low <= end:
+            return low, min(high, end)
+        if begin > low:
+            return max(low, (last + begin) / 2), min(high, (begin + min(end, 2 * begin)) / 2)
+        last = end
+    return None
+
+
 def floor(problem: Problem) -> float | None:
     """A lower bound on a least time, in continuous time: that of the chain without its snap limit; None where that is
     not known."""
@@ -98,10 +133,20 @@ def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:
     """
     wanted = setting.problem.transcription
     arcs = shortest(chain, wanted.min_dwell, wanted.touches)
+    _refuse_out_of_range(setting.problem, arcs)
     trajectory = _trajectory(setting, chain, arcs)
     bound, about = _bound(setting, chain, arcs, clock)
     notes = {"structure": _structure(arcs, bound), "bounds": about, "prices": _prices(setting.problem, arcs)}
     return Attempt(Outcome(Claim.OPTIMAL, "switching times"), trajectory, arcs.duration, bound, notes=notes)
+
+
+def _refuse_out_of_range(problem: Problem, arcs: Arcs) -> None:
+    """Raise Impossible or Unresolved for a least time outside the range that is asked for."""
+    time = problem.move.time
+    if not isinstance(time, tuple) or time[0] <= arcs.duration <= time[1]:
+        return
+    text = f"the least time is {arcs.duration:.7g} s, outside {time[0]:g} s to {time[1]:g} s"
+    raise (Impossible if arcs.lowest > time[1] and not problem.can_wait else Unresolved)(text)
 
 
 def _trajectory(setting: Setting, chain: Chain, arcs: Arcs) -> Trajectory:

@@ -17,6 +17,8 @@ from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered
 from trajopt.prices import time_prices
 from trajopt.problem import FREE
+from trajopt.switching import Impossible, Unresolved
+from trajopt.switching_times import as_chain, next_possible
 from trajopt.transcribe import Setting
 
 _RELATIVE = 1e-10  # of the duration: how close the search brackets it
@@ -114,7 +116,7 @@ class _Search:
 
     def least(self) -> float:
         """The shortest duration within its range."""
-        time = self._setting.problem.move.time
+        time = self._range()
         if isinstance(time, tuple):
             if self.margin(time[0]) >= 0:
                 return time[0]
@@ -122,6 +124,19 @@ class _Search:
                 raise _Stopped(Outcome(Claim.INFEASIBLE, f"more than {time[1]:g} s are needed"))
         low, high = time if isinstance(time, tuple) else self.bracket()
         return self.feasible_near(brentq(self.margin, low, high, xtol=_RELATIVE * low, rtol=_RELATIVE, maxiter=100))
+
+    def _range(self) -> float | str | tuple[float, float]:
+        """The range of durations, narrowed to where its least possible one lies if that need not be monotone."""
+        problem = self._setting.problem
+        time, chain = problem.move.time, as_chain(problem)
+        if not isinstance(time, tuple) or problem.can_wait or chain is None:
+            return time
+        try:
+            if (narrow := next_possible(chain, *time)) is not None:
+                return narrow
+        except (Impossible, Unresolved):
+            pass
+        raise _Stopped(Outcome(Claim.INFEASIBLE, f"no time from {time[0]:g} s to {time[1]:g} s is possible"))
 
     def bracket(self) -> tuple[float, float]:
         """(too short, long enough)."""

@@ -9,7 +9,7 @@ the sum falls below the distance no move of that duration exists, nor a shorter 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import factorial, inf
+from math import factorial, inf, isfinite
 
 from scipy.optimize import brentq
 
@@ -46,28 +46,51 @@ def lower_bound(
     return (float(brentq(excess, 0.0, 1.0, xtol=1e-16)) if excess(1.0) > 0 else 1.0) * sum(durations)
 
 
-def shortfall(
+def reach_beyond(
     chain: Chain,
     active: Sequence[str],
     durations: Sequence[float],
     conditions: Sequence[Condition],
     prices: Sequence[float],
-) -> float:
-    """By how much the ends may miss the farthest that any move of the same duration reaches, as duration, for any ends;
-    infinite when the multipliers show nothing. Zero proves an extremal: the duration is the border of possible ones.
+) -> tuple[float, ...]:
+    """How far beyond its end any move could get at most, for any ends, forwards or, where the price of the distance is
+    negative, backwards: the coefficients of a polynomial of the share of the duration that it takes, for shares up to
+    one; none when the multipliers show nothing.
+
+    Where it is negative no move is possible. Zero at one proves an extremal: the duration is the border of possible
+    ones.
     """
     price = _price(active, conditions, prices)
     if price < 0:
         turned = [Condition(c.arcs, c.derivative, -c.value) for c in conditions]
         swap = {"max": "min", "min": "max"}
         names = [f"{name[:-3]}{swap[name[-3:]]}" for name in active]
-        return shortfall(chain.mirrored(), names, durations, turned, [-p for p in prices])
+        return reach_beyond(chain.mirrored(), names, durations, turned, [-p for p in prices])
     if not price > 0:
-        return inf
+        return ()
     masses, first, last = _costates(chain.order, active, durations, conditions, [p / price for p in prices])
-    ends = sum(first[i] * chain.start[i] - last[i] * chain.end[i] for i in range(1, chain.order))
-    reached = ends + sum(term for _, term in _terms(chain, masses, sum(durations)))
-    return max(0.0, reached - chain.distance) * price
+    beyond = [-chain.distance, *(0.0 for _ in range(chain.order))]
+    for i in range(1, chain.order):
+        beyond[i] += first[i] * chain.start[i] - last[i] * chain.end[i]
+    for power, term in _terms(chain, masses, sum(durations)):
+        beyond[power] += term
+    return tuple(beyond)
+
+
+def impossible(beyond: Sequence[float], low: float) -> tuple[float, float]:
+    """The uppermost interval of shares of the duration, from ``low`` to one, in which such a polynomial is negative;
+    (low, low) where there is none."""
+    if not all(map(isfinite, beyond)) or not beyond:
+        return low, low
+    roots = real_roots([c * factorial(k) for k, c in enumerate(beyond)])
+    marks = [low, *sorted(x for x in roots if low < x < 1), 1.0]
+    found: list[tuple[float, float]] = []
+    for a, b in zip(marks[-2::-1], marks[:0:-1], strict=True):
+        if sum(c * ((a + b) / 2) ** k for k, c in enumerate(beyond)) < 0:
+            found.append((a, b))
+        elif found:
+            break
+    return (found[-1][0], found[0][1]) if found else (low, low)
 
 
 def _price(active: Sequence[str], conditions: Sequence[Condition], prices: Sequence[float]) -> float:

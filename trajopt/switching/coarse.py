@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import factorial, inf, isfinite
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,7 @@ from scipy.optimize import linprog
 
 from trajopt.switching.chain import NAMES, Chain
 from trajopt.switching.ramps import Piece
+from trajopt.switching.stationary import Condition
 
 Vector = npt.NDArray[np.float64]
 
@@ -56,30 +58,51 @@ class Grid:
 
     def farthest(self, way: float) -> Vector | None:
         """(N,) top derivative of the move that goes farthest in a direction, its other end values as prescribed."""
-        return self._solve(-way * self.maps[0][-1], 1)
+        result = self._solve(-way * self.maps[0][-1], 1)
+        return None if result is None else np.asarray(result.x)
 
-    def _solve(self, cost: Vector, prescribed: int) -> Vector | None:
-        rows, bounds = [], []
-        for i, (low, high) in enumerate(self.chain.limits[:-1]):
-            for sign, limit in ((1.0, high), (-1.0, -low)):
-                if limit < inf:
-                    size = np.max(np.abs(self.maps[i]))
-                    rows.append(sign * self.maps[i][:-1] / size)
-                    bounds.append((limit - sign * self.free[i][:-1]) / size)
-        goal = (self.chain.distance, *self.chain.end[1:])
+    def prices(self, way: float) -> tuple[list[Condition], list[float]] | None:
+        """The conditions that hold back the farthest move in a direction, and the costates' jumps there, scaled so that
+        the position's at the end is ``way``."""
+        result, last = self._solve(-way * self.maps[0][-1], 1), len(self.maps[0])
+        if result is None:
+            return None
+        scale, sizes = float(np.max(np.abs(self.maps[0][-1]))), [float(np.max(np.abs(m))) for m in self.maps]
+        found = [(Condition(last, 0, self.chain.distance), way)]
+        for i, marginal in enumerate(result.eqlin.marginals, start=1):
+            found.append((Condition(last, i, self.chain.end[i]), float(marginal) * scale / sizes[i]))
+        rows = np.split(np.asarray(result.ineqlin.marginals), len(result.ineqlin.marginals) // (last - 1) or 1)
+        for (i, sign, limit), marginals in zip(self._sides(), rows, strict=False):
+            for k in map(int, np.flatnonzero(marginals)):
+                found.append((Condition(k + 1, i, sign * limit), float(sign * marginals[k]) * scale / sizes[i]))
+        return [c for c, _ in found], [p for _, p in found]
+
+    def _sides(self) -> list[tuple[int, float, float]]:
+        """(derivative, sign, limit of what has that sign) of all finite limits below the top."""
+        return [
+            (i, sign, limit)
+            for i, (low, high) in enumerate(self.chain.limits[:-1])
+            for sign, limit in ((1.0, high), (-1.0, -low))
+            if limit < inf
+        ]
+
+    def _solve(self, cost: Vector, prescribed: int) -> Any:
         sizes = [np.max(np.abs(m)) for m in self.maps]
+        rows = [sign * self.maps[i][:-1] / sizes[i] for i, sign, _ in self._sides()]
+        bounds = [(limit - sign * self.free[i][:-1]) / sizes[i] for i, sign, limit in self._sides()]
+        goal = (self.chain.distance, *self.chain.end[1:])
         ends = np.array([self.maps[i][-1] / sizes[i] for i in range(prescribed, self.chain.order)])
         goals = [(goal[i] - self.free[i][-1]) / sizes[i] for i in range(prescribed, self.chain.order)]
         result = linprog(
             cost / (np.max(np.abs(cost)) or 1.0),
             np.vstack(rows) if rows else None,
             np.concatenate(bounds) if rows else None,
-            ends,
-            goals,
+            ends if len(ends) else None,
+            goals if len(ends) else None,
             bounds=self.chain.top,
             method="highs",
         )
-        return np.asarray(result.x) if result.status == 0 else None
+        return result if result.status == 0 else None
 
     def sketch(self, tops: Vector) -> Sketch:
         """The arcs that a solution shows: plateaus where a limit holds, elsewhere the top derivative at its limits, an

@@ -1,108 +1,92 @@
-"""Any chain: structure from a coarse linear program, switching times by Newton, verdict, repair."""
+"""Any chain: structure from the third order or a coarse linear program, switching times by Newton, verdict, repair."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import accumulate
-from math import fsum, inf, isfinite
+from collections.abc import Callable
+from math import inf, isfinite
 
-from trajopt.switching.certificate import shortfall
-from trajopt.switching.chain import NAMES, Arcs, Chain, Unresolved, back_in_time
-from trajopt.switching.coarse import Grid, Sketch
+from trajopt.switching.chain import Arcs, Chain, Unresolved, back_in_time
+from trajopt.switching.coarse import Grid
+from trajopt.switching.cover import ruled_out
+from trajopt.switching.from_third import sketches
 from trajopt.switching.low import normalised, shortest_low
-from trajopt.switching.polynomials import Audit, audit
-from trajopt.switching.repair import with_limit, with_touches, without_shortest
-from trajopt.switching.stationary import Condition, prices_of, shortest_sequence
+from trajopt.switching.refine import EXTREMAL, Verified, as_arcs, refined, with_more_touches
 
 _GRIDS = (60, 90, 120, 170)  # intervals, the first of them to find the duration
 _SHORTEST, _LONGEST, _GROWTH = 0.2, 200.0, 1.1  # of the normalised time: where the first possible duration is sought
 _CLOSE = 1e-3  # relative: width of the bracket from which the structure is read
-_REPAIRS = 8
 _ROUNDS = 3  # touches added at each end of a plateau of velocity
-_SHARES = (1.0, 0.7, 0.4, 0.2)  # of the jerk of a self-similar touch, where a new one is begun
+OPEN, CUT_OFF = 1e-9, 1e-7  # relative: a loss that only a wrong structure leaves, and where chattering is cut off
+_SAME = 1e-11  # relative: durations that rounding tells apart
 _NEAR = 0.02  # relative: a structure this much longer than the coarse move is not that of the coarse move
-_EXTREMAL = 1e-10  # relative gap
-_CUT_OFF = 1e-5  # the same where chattering was cut off, which leaves a gap far above the loss of duration
-
-
-@dataclass(frozen=True)
-class _Found:
-    """A verified sequence; ``gap``: the duration by which its multipliers leave it short of an extremal."""
-
-    sketch: Sketch
-    audit: Audit
-    gap: float
-
-    @property
-    def duration(self) -> float:
-        return fsum(p.duration for p in self.sketch.pieces)
-
-    @property
-    def dwell(self) -> float:
-        return min(p.duration for p in self.sketch.pieces)
-
-    @property
-    def touches(self) -> int:
-        """Of a limit of velocity."""
-        return sum(t.derivative == 1 for t in self.sketch.touches)
 
 
 def shortest_general(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
-    """A verified move whose structure a coarse program shows.
+    """A verified move whose structure a third-order move or a coarse program shows.
 
-    It is preferred to be an extremal, shown by its multipliers: then no move of the same duration reaches farther. Its
-    lower bound is that of lower orders. Raises Impossible, or Unresolved if no move can be verified.
+    It is preferred to be an extremal, shown by its multipliers: then no move of the same duration reaches farther, and
+    they bound the least duration too. Raises Impossible, or Unresolved if no move can be verified.
     """
     scaled, units, time = normalised(chain)
-    lowest = _lower_orders(scaled)
-    duration = _first_possible(scaled, lowest)
-    found: list[_Found] = []
+    floor = _lower_orders(scaled)
+
+    def allowed(one: Verified) -> bool:
+        return one.dwell * time >= min_dwell and (touches is None or one.touches <= 2 * touches)
+
+    rounds = _ROUNDS if touches is None else touches
+    found = list(filter(allowed, _from_third_order(scaled, rounds)))
+    best, lowest = _judged(scaled, floor, found)
+    cut = touches is not None or min_dwell > 0
+    if best is None or (not cut and lowest < best.duration * (1 - (CUT_OFF if best.chatters else OPEN))):
+        found += filter(allowed, _from_grids(scaled, floor, rounds, allowed))
+        best, lowest = _judged(scaled, floor, found)
+    if best is None:
+        raise Unresolved("no structure that a third-order move or a coarse program shows could be verified")
+    return back_in_time(as_arcs(best, lowest), units, time)
+
+
+def _judged(chain: Chain, floor: float, found: list[Verified]) -> tuple[Verified | None, float]:
+    """The shortest sequence, and a lower bound on the least duration: ``floor``, or where the multipliers of one rule
+    out those between."""
+    if not found:
+        return None, floor
+    least = min(one.duration for one in found) * (1 + _SAME)
+    best = max((one for one in found if one.duration <= least), key=lambda one: one.dwell)
+    spans = [one.impossible(floor) for one in found]
+    low, high = max((span for span in spans if span[1] <= least), key=lambda span: span[1], default=(floor, floor))
+    if low > floor and (reached := ruled_out(chain, floor, low)) < low:
+        high = reached
+    return best, min(high, best.duration)
+
+
+def _from_third_order(chain: Chain, rounds: int) -> list[Verified]:
+    found: list[Verified] = []
+    for sketch in sketches(chain) if chain.order == 4 else ():
+        for local in (True, False):
+            if (one := refined(chain, sketch, local)) is not None:
+                found += with_more_touches(chain, one, rounds)
+                if found[-1].is_extremal:
+                    return found
+    return found
+
+
+def _from_grids(chain: Chain, floor: float, rounds: int, allowed: Callable[[Verified], bool]) -> list[Verified]:
+    duration = _first_possible(chain, floor)
+    found: list[Verified] = []
     for intervals in _GRIDS:
-        grid = Grid(scaled, duration, intervals)
+        grid = Grid(chain, duration, intervals)
         for way in (1.0, -1.0):
             if (tops := grid.farthest(way)) is None:
                 continue
             for local in (True, False):
-                if (one := _refined(scaled, grid.sketch(tops), local)) is not None:
-                    found += _chattering(scaled, one, _ROUNDS if touches is None else touches)
-                    if one.gap <= _EXTREMAL * one.duration:
+                if (one := refined(chain, grid.sketch(tops), local)) is not None:
+                    found += with_more_touches(chain, one, rounds)
+                    if one.gap <= EXTREMAL * one.duration:
                         break
-        found = [f for f in found if f.duration <= duration * (1 + _NEAR) and f.dwell * time >= min_dwell]
-        found = [f for f in found if touches is None or f.touches <= 2 * touches]
-        if any(f.gap <= (_CUT_OFF if _chatters(f) else _EXTREMAL) * f.duration for f in found):
+        found = [one for one in found if one.duration <= duration * (1 + _NEAR) and allowed(one)]
+        if any(one.is_extremal for one in found):
             break
-    if not found:
-        raise Unresolved("no structure that a coarse program shows could be verified")
-    best = min(found, key=lambda f: f.duration)
-    return back_in_time(_arcs(best, min(lowest, best.duration)), units, time)
-
-
-def _chatters(found: _Found) -> bool:
-    return {"snap", "velocity"} <= {p.active.partition(".")[0] for p in found.sketch.pieces}
-
-
-def _chattering(chain: Chain, found: _Found, rounds: int) -> list[_Found]:
-    """The sequence, and with more and more touches before and after each plateau of velocity."""
-    out = [found]
-    for _ in range(rounds):
-        if chain.order < 4 or out[-1].gap <= _EXTREMAL * out[-1].duration:
-            break
-        again = _more_touches(chain, out[-1].sketch)
-        if again is None or again.duration >= out[-1].duration:
-            break
-        out.append(again)
-    return out
-
-
-def _more_touches(chain: Chain, sketch: Sketch) -> _Found | None:
-    """With a touch more beside each plateau of velocity: first with its jerk prescribed, then freed."""
-    for share in _SHARES:
-        if (more := with_touches(chain, sketch, share)) is None:
-            return None
-        conditions = [*_conditions(chain, more[0]), *more[1]]
-        if (pinned := _solved(chain, more[0], conditions, True)) and (found := _refined(chain, pinned, True)):
-            return found
-    return None
+    return found
 
 
 def _lower_orders(chain: Chain) -> float:
@@ -133,69 +117,3 @@ def _first_possible(chain: Chain, lowest: float) -> float:
     return high
 
 
-def _refined(chain: Chain, sketch: Sketch, local: bool) -> _Found | None:
-    """The stationary sequence of a sketch, repaired until it is verified: arcs that vanish go, limits that are broken
-    are held or touched."""
-    for _ in range(_REPAIRS):
-        conditions = _conditions(chain, sketch)
-        if (solved := _solved(chain, sketch, conditions, local)) is None:
-            if (smaller := without_shortest(sketch)) is None:
-                return None
-            sketch = smaller
-            continue
-        sketch = solved
-        tops, durations, active = zip(*((p.top, p.duration, p.active) for p in sketch.pieces), strict=True)
-        verdict = audit(chain, tops, durations)
-        if verdict.accepted:
-            prices = prices_of((0.0, *chain.start[1:]), tops, conditions, durations)
-            return _Found(sketch, verdict, shortfall(chain, active, durations, conditions, prices))
-        if (held := with_limit(chain, sketch, verdict.worst)) is None:
-            return None
-        sketch = held
-    return None
-
-
-def _solved(chain: Chain, sketch: Sketch, conditions: list[Condition], local: bool) -> Sketch | None:
-    """The sketch with stationary durations."""
-    tops, durations, _ = zip(*sketch.pieces, strict=True)
-    if len(conditions) > len(tops):
-        return None
-    found = shortest_sequence((0.0, *chain.start[1:]), tops, conditions, durations, local)
-    if found is None:
-        return None
-    return Sketch(tuple(p._replace(duration=d) for p, d in zip(sketch.pieces, found, strict=True)), sketch.touches)
-
-
-def _conditions(chain: Chain, sketch: Sketch) -> list[Condition]:
-    out = []
-    for number, piece in enumerate(sketch.pieces):
-        name, _, side = piece.active.partition(".")
-        i = NAMES.index(name)
-        if i < chain.order and number:
-            out.append(Condition(number, i, chain.limits[i][side == "max"]))
-            out += [Condition(number, k, 0.0) for k in range(i + 1, chain.order)]
-    for touch in sketch.touches:
-        out.append(Condition(touch.arcs, touch.derivative, chain.limits[touch.derivative][touch.upper]))
-        out.append(Condition(touch.arcs, touch.derivative + 1, 0.0))
-    goal = (chain.distance, *chain.end[1:])
-    return out + [Condition(len(sketch.pieces), i, x) for i, x in enumerate(goal)]
-
-
-def _arcs(found: _Found, lowest: float) -> Arcs:
-    pieces, verdict = found.sketch.pieces, found.audit
-    ends = list(accumulate(p.duration for p in pieces))
-    touches = tuple(
-        (ends[t.arcs - 1], f"{NAMES[t.derivative]}.{'max' if t.upper else 'min'}") for t in found.sketch.touches
-    )
-    durations, tops, active = zip(*((p.duration, p.top, p.active) for p in pieces), strict=True)
-    return Arcs(
-        durations,
-        tops,
-        active,
-        touches,
-        lowest,
-        verdict.residual,
-        verdict.excess,
-        chatters=_chatters(found),
-        gap=found.gap,
-    )

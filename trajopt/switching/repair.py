@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 from trajopt.switching.chain import NAMES, Chain
-from trajopt.switching.chatter import chattering
+from trajopt.switching.chatter import Chattering, chattering
 from trajopt.switching.coarse import Sketch, Touch
 from trajopt.switching.polynomials import advance, instants, states
 from trajopt.switching.ramps import Piece
@@ -65,10 +66,11 @@ def _peaks(chain: Chain, sketch: Sketch, derivative: int) -> Iterator[tuple[int,
 
 
 @dataclass(frozen=True)
-class _Ending:
-    """What takes the place of ``used`` arcs beside a plateau of velocity: arcs before and after a new touch of its
-    limit, and the jerk there."""
+class Ending:
+    """What takes the place of ``used`` arcs from number ``first`` on, beside a plateau of velocity: arcs before and
+    after a new touch of its limit, and the jerk there."""
 
+    first: int
     used: int
     upper: bool
     before: list[Piece]
@@ -76,17 +78,15 @@ class _Ending:
     jerk: float
 
 
-def with_touches(chain: Chain, sketch: Sketch, share: float) -> tuple[Sketch, list[Condition]] | None:
-    """One touch more before and after each plateau of velocity, and the jerks there, a share of those of a self-similar
-    approach: the smaller, the less the rest of the move changes. None without such a plateau."""
+def with_touches(sketch: Sketch, endings: Sequence[Ending]) -> tuple[Sketch, list[Condition]]:
+    """The sketch with these touches, and the jerks there."""
     pieces: list[Piece] = []
     touches: list[Touch] = []
     jerks: list[Condition] = []
-    old = {t.arcs: t for t in sketch.touches}
+    old, new = {t.arcs: t for t in sketch.touches}, {e.first: e for e in endings}
     k = 0
     while k < len(sketch.pieces):
-        ending = _ending(chain, sketch, k, True, share) or _ending(chain, sketch, k, False, share)
-        if ending is None:
+        if (ending := new.get(k)) is None:
             pieces.append(sketch.pieces[k])
             k += 1
         else:
@@ -97,33 +97,59 @@ def with_touches(chain: Chain, sketch: Sketch, share: float) -> tuple[Sketch, li
             k += ending.used
         if k in old:
             touches.append(Touch(len(pieces), old[k].derivative, old[k].upper))
-    return (Sketch(tuple(pieces), tuple(touches)), jerks) if jerks else None
+    return Sketch(tuple(pieces), tuple(touches)), jerks
 
 
-def _ending(chain: Chain, sketch: Sketch, k: int, towards: bool, share: float) -> _Ending | None:
+def endings(chain: Chain, sketch: Sketch, share: float) -> list[Ending]:
+    """A touch more beside each plateau of velocity, with a share of the jerk of a self-similar approach: the smaller,
+    the less the rest of the move changes."""
+    found: list[Ending] = []
+    for k in range(len(sketch.pieces)):
+        for used in (3, 1):
+            for towards in (True, False):
+                free = not found or found[-1].first + found[-1].used <= k
+                if free and (ending := _ending(chain, sketch, k, used, towards, share)) is not None:
+                    found.append(ending)
+    return found
+
+
+def _ending(chain: Chain, sketch: Sketch, k: int, used: int, towards: bool, share: float) -> Ending | None:
     """For the arcs from number k on, if they end at a plateau of velocity (or begin there): one arc that no touch
     precedes (or follows), or the three after one (or before)."""
     pieces, touched = sketch.pieces, {t.arcs for t in sketch.touches if t.derivative == 1}
-    for used in (3, 1):
-        last = k + used
-        plateau, free = (last, k) if towards else (k - 1, last)
-        if not (0 <= plateau < len(pieces) and 0 < free < len(pieces) and last <= len(pieces)):
-            continue
-        if not pieces[plateau].active.startswith("velocity") or (free in touched) != (used == 3):
-            continue
-        upper = pieces[plateau].active == "velocity.max"
-        back, forth = chain.top if upper == towards else chain.top[::-1]
-        if pieces[k].top != forth:
-            continue
-        law, old = chattering(abs(back / forth)), [p.duration for p in pieces[k:last]]
-        first = old if towards else old[::-1]
-        scale = (law.alpha * sum(old) / sum(law.greedy) if used == 3 else _TOUCH * old[0]) * share
+    last = k + used
+    plateau, free = (last, k) if towards else (k - 1, last)
+    if not (0 <= plateau < len(pieces) and 0 < free < len(pieces) and last <= len(pieces)):
+        return None
+    if not pieces[plateau].active.startswith("velocity") or (free in touched) != (used == 3):
+        return None
+    upper = pieces[plateau].active == "velocity.max"
+    back, forth = chain.top if upper == towards else chain.top[::-1]
+    if pieces[k].top != forth:
+        return None
+    law, old = chattering(abs(back / forth)), [p.duration for p in pieces[k:last]]
+    if used == 3:
+        size = sum(old) / sum(law.greedy)
+        scale = law.alpha * size * share
+        first = [d * size for d in law.arcs] if share == 1 else old if towards else old[::-1]
+    else:
+        scale = _first_touch(law, old[0], pieces[k - 1 if towards else last]) * old[0] * share
+        first = old
+    if used == 1 or share < 1:
         first[-1] -= scale
-        before, after = (_alternate(chain, forth, back, d) for d in (first, [d * scale for d in law.greedy]))
-        if not towards:
-            before, after = after[::-1], before[::-1]
-        return _Ending(used, upper, before, after, (-1.0 if upper else 1.0) * abs(forth) * scale)
-    return None
+    before, after = (_alternate(chain, forth, back, d) for d in (first, [d * scale for d in law.greedy]))
+    if not towards:
+        before, after = after[::-1], before[::-1]
+    return Ending(k, used, upper, before, after, (-1.0 if upper else 1.0) * abs(forth) * scale)
+
+
+def _first_touch(law: Chattering, ramp: float, beside: Piece) -> float:
+    """The jerk c of a first touch, as a share of that before the ramp. Beside a plateau of jerk of p ramps' length the
+    velocity that it gains for the rest of the move, p/2 (1/24 - ∫ c (1 - c)² dc / 2), is weighed against the loss
+    of law.cost c^4 to come."""
+    if not beside.active.startswith("jerk"):
+        return _TOUCH
+    return max(_TOUCH, 1 / (1 + sqrt(16 * law.cost * ramp / beside.duration)))
 
 
 def _alternate(chain: Chain, forth: float, back: float, durations: list[float]) -> list[Piece]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 
 from trajopt.switching.chain import NAMES, Arcs, Chain, Unresolved
 from trajopt.switching.doomed import refuse_doomed
-from trajopt.switching.general import shortest_general
+from trajopt.switching.general import CUT_OFF, OPEN, shortest_general
 from trajopt.switching.low import OutOfRange, shortest_low
 from trajopt.switching.snap import between_rests
-
-_OPEN = 1e-9  # relative: a loss that only a wrong structure leaves
 
 
 def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -> Arcs:
@@ -20,9 +17,9 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
     A fourth-order move that holds its greatest velocity needs switches without end; they are cut off where the loss is
     below 1e-10 of the duration, after ``touches`` touches of the limit at each end, or before two switches come closer
     than ``min_dwell``; ``bracket`` tells what that costs. Orders one to three do not chatter and ignore both.
-    The bracket is closed but for rounding for orders one to three without active position limits, and for fourth-order
-    moves between rests, save a few short ones whose limits of acceleration or snap differ by side. Elsewhere the
-    structure is that of a coarse program, and the lower bound that of lower orders.
+    The bracket is closed but for rounding for orders one to three without active position limits, and mostly so at
+    fourth order; where the multipliers of the arcs prove less, the lower bound is that of coarse programs or of lower
+    orders.
     Raises Impossible, or Unresolved when no list of arcs could be verified.
     """
     if min_dwell < 0 or (touches is not None and touches < 0):
@@ -36,23 +33,32 @@ def shortest(chain: Chain, min_dwell: float = 0.0, touches: int | None = None) -
         except OutOfRange:
             return shortest_general(chain, 0.0, None)
     if not chain.at_rest:
-        return _either_way(chain, min_dwell, touches)
+        return _either_way(chain, min_dwell, touches, None)
     arcs = between_rests(chain, min_dwell, touches)
-    if arcs.loss > _OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
-        with suppress(Unresolved):
-            other = shortest_general(chain, min_dwell, touches)
-            if other.duration < arcs.duration:
-                lowest = min(max(arcs.lowest, other.lowest), other.duration)
-                return replace(other, lowest=lowest, ordinary=arcs.ordinary)
+    if arcs.loss > OPEN and not arcs.chatters and min_dwell == 0 and touches is None:
+        arcs = replace(_either_way(chain, min_dwell, touches, arcs), ordinary=arcs.ordinary)
     return arcs
 
 
-def _either_way(chain: Chain, min_dwell: float, touches: int | None) -> Arcs:
-    """Forwards in time, or where no structure is found, backwards."""
-    try:
-        return shortest_general(chain, min_dwell, touches)
-    except Unresolved:
-        return run_backwards(shortest_general(chain.reversed(), min_dwell, touches), chain.order)
+def _either_way(chain: Chain, min_dwell: float, touches: int | None, best: Arcs | None) -> Arcs:
+    """The shortest that is found forwards in time, or where that leaves a bracket, backwards; or known already."""
+    failure: Unresolved | None = None
+    for turn in (False, True):
+        try:
+            arcs = shortest_general(chain.reversed() if turn else chain, min_dwell, touches)
+        except Unresolved as reason:
+            failure = failure or reason
+            continue
+        arcs = run_backwards(arcs, chain.order) if turn else arcs
+        shorter = arcs if best is None or arcs.duration < best.duration else best
+        lowest = max(arcs.lowest, best.lowest if best else 0.0)
+        best = replace(shorter, lowest=min(lowest, shorter.duration))
+        if min_dwell or touches is not None or best.loss <= (CUT_OFF if best.chatters else OPEN):
+            break
+    if best is None:
+        assert failure is not None
+        raise failure
+    return best
 
 
 def run_backwards(arcs: Arcs, order: int) -> Arcs:

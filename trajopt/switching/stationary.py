@@ -76,12 +76,22 @@ def prices_of(
 ) -> tuple[float, ...]:
     """The multipliers that come nearest to making given durations stationary: duration per unit of each condition's
     value, with the sign of an increase."""
-    system = _System(np.array(start), np.array(tops), conditions, False)
-    return tuple(map(float, _prices(system, np.cumsum(durations))))
+    system, times = _System(np.array(start), np.array(tops), conditions, True), np.cumsum(durations)
+    prices = _prices(system, times)
+    # a condition computed from another border counts there too
+    borders = np.concatenate([[0.0], times])
+    known = {(c.arcs, c.derivative): row for row, c in enumerate(conditions)}
+    total = prices.copy()
+    for row, c in enumerate(conditions):
+        base = int(system.base[row])
+        for power in range(len(start) - c.derivative if base else 0):
+            since = borders[c.arcs] - borders[base]
+            total[known[base, c.derivative + power]] -= prices[row] * since**power / _FACTORIALS[power]
+    return tuple(map(float, total))
 
 
 def _prices(system: _System, times: Vector) -> Vector:
-    _, slope, _ = system.evaluate(times, np.zeros(len(system.last)))
+    _, slope, _ = system.evaluate(times, np.zeros(len(system.border)))
     # conditions and borders differ by powers of the shortest arc: both are scaled to one
     of_condition = _inverse(np.max(np.abs(slope), axis=1))
     of_border = _inverse(np.max(np.abs(slope * of_condition[:, None]), axis=0))
@@ -95,36 +105,39 @@ def _inverse(sizes: Vector) -> Vector:
 
 
 class _System:
-    """The conditions as functions of the border times.
+    """The conditions as functions of the border times, border 0 being the start.
 
-    A condition is computed from the last border before it where its derivative and all above are known, which is the
-    start of the move or that of a plateau; ``local`` false: always from the start of the move.
+    A condition is computed from the nearest border where its derivative and all above are known, be it the start of
+    the move, that of a plateau before it, or that of the next plateau, backwards; ``local`` false: always from the
+    start of the move. Seen from there the top derivative is a sum of jumps at the borders between.
     """
 
     def __init__(self, start: Vector, tops: Vector, conditions: Sequence[Condition], local: bool) -> None:
-        order, self.arcs = len(start), len(tops)
+        order, self.arcs, rows = len(start), len(tops), len(conditions)
         self.duration = np.zeros(self.arcs)
         self.duration[-1] = 1.0
-        self.last = np.array([c.arcs - 1 for c in conditions])
+        self.border = np.array([c.arcs for c in conditions])
         self.powers = np.array([order - c.derivative for c in conditions])
         self.values = np.array([c.value for c in conditions])
         known = _known(start, conditions) if local else {0: start}
-        self.base = np.array([_base(known, c, order) for c in conditions])
-        arcs = np.arange(self.arcs)
-        self.within = (arcs >= self.base[:, None]) & (arcs <= self.last[:, None])
-        self.jumps = np.where(self.within, np.diff(tops, prepend=0.0), 0.0)
+        self.base = np.array([_base(known, c) for c in conditions])
+        self.jumps = np.zeros((rows, self.arcs + 1))
         # what the known state alone gives, and its first two derivatives: rows of Taylor coefficients
-        self.free = np.zeros((3, len(conditions), order))
+        self.free = np.zeros((3, rows, order))
         for row, c in enumerate(conditions):
-            self.jumps[row, self.base[row]] = tops[self.base[row]]
+            base = int(self.base[row])
+            ahead = base < c.arcs
+            between = slice(base, c.arcs) if ahead else slice(c.arcs, base)
+            jumps = np.diff(tops[between], prepend=0.0) if ahead else -np.diff(tops[between], append=0.0)
+            self.jumps[row, (base if ahead else c.arcs + 1) :][: len(jumps)] = jumps
             for shift in range(3):
-                taylor = known[int(self.base[row])][c.derivative + shift :]
+                taylor = known[base][c.derivative + shift :]
                 self.free[shift, row, : len(taylor)] = taylor / _FACTORIALS[: len(taylor)]
 
     def evaluate(self, times: Vector, prices: Vector) -> tuple[Vector, Vector, Vector]:
         """Conditions (M,), their gradients (M, K) by border times, and the (K, K) Hessian of prices @ conditions."""
-        rows, starts = np.arange(len(self.last)), np.concatenate([[0.0], times[:-1]])
-        since = np.where(self.within, times[self.last][:, None] - starts, 0.0)
+        rows, borders = np.arange(len(self.border)), np.concatenate([[0.0], times])
+        since = borders[self.border][:, None] - borders
         table = np.zeros((6, *since.shape))  # jumps * since**k / k!, k = -1 .. 4, zero for k = -1
         table[1] = self.jumps
         for k in range(1, 5):
@@ -134,19 +147,14 @@ class _System:
         free = np.sum(self.free * since[rows, self.base][:, None] ** np.arange(self.free.shape[2]), axis=2)
         for part, known in zip((now, first, second), free, strict=True):
             part[rows, self.base] += known
-        # border k - 1 is the start of arc k
-        slope = np.zeros_like(since)
-        slope[:, :-1] = -first[:, 1:]
-        slope[rows, self.last] += first.sum(axis=1)
+        slope = -first
+        slope[rows, self.border] += first.sum(axis=1)
         curved = prices[:, None] * second
-        bend = np.zeros((self.arcs, self.arcs))
-        span = np.arange(self.arcs - 1)
-        bend[span, span] = curved[:, 1:].sum(axis=0)
-        cross = np.zeros_like(bend)
-        np.add.at(cross[:, :-1], self.last, curved[:, 1:])
-        bend -= cross + cross.T
-        np.add.at(bend, (self.last, self.last), curved.sum(axis=1))
-        return now.sum(axis=1) - self.values, slope, bend
+        cross = np.zeros((self.arcs + 1, self.arcs + 1))
+        np.add.at(cross, self.border, curved)
+        bend = np.diag(curved.sum(axis=0)) - cross - cross.T
+        np.add.at(bend, (self.border, self.border), curved.sum(axis=1))
+        return now.sum(axis=1) - self.values, slope[:, 1:], bend[1:, 1:]
 
 
 def _known(start: Vector, conditions: Sequence[Condition]) -> dict[int, Vector]:
@@ -157,7 +165,10 @@ def _known(start: Vector, conditions: Sequence[Condition]) -> dict[int, Vector]:
     return known
 
 
-def _base(known: dict[int, Vector], condition: Condition, order: int) -> int:
-    return max(
-        b for b, state in known.items() if b < condition.arcs and not np.isnan(state[condition.derivative :]).any()
-    )
+def _base(known: dict[int, Vector], condition: Condition) -> int:
+    """The border from which a condition is computed: the last one where enough is known, or for a border where the
+    whole state is not, the next one if that is fewer arcs away."""
+    enough = [b for b, state in known.items() if not np.isnan(state[condition.derivative :]).any()]
+    before = max(b for b in enough if b < condition.arcs)
+    after = min((b for b in enough if b > condition.arcs), default=np.inf)
+    return int(after) if condition.arcs not in enough and after - condition.arcs < condition.arcs - before else before
