@@ -39,11 +39,14 @@ _EXAMPLES: Final = {  # what to write for what is missing
     "vibration.frequency": 'write [[vibration]] with frequency = "8 Hz"',
     "objective": 'write [objective] with minimize = "jerk" and norm = "l2"',
     "objective.terms": 'write minimize = "jerk" and norm = "l2", or terms',
+    "objective.ceilings.of": 'write for example of = "energy"',
+    "objective.ceilings.at_most": 'write for example at_most = "0.9 J"',
     "objective.terms.minimize": f"write minimize = one of {', '.join(p.MINIMIZABLE)}",
 }
 _LISTS: Final = {
     "vibration": '[{ frequency = "8 Hz" }]',
     "via": '[{ time = "0.5 s", position = "0.1 m" }]',
+    "ceilings": '[{ of = "energy", at_most = "0.9 J" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
 _SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"

@@ -96,7 +96,7 @@ def _by_arcs(setting: Setting, chosen: Route, clock: Clock) -> Solution:
 
 
 def _is_affine(problem: Problem) -> bool:
-    return all(is_affine(problem, term.minimize) for term in problem.objective.terms)
+    return all(is_affine(problem, term.minimize) for term in problem.objective.all_terms)
 
 
 def _coasting(setting: Setting) -> Attempt | None:
