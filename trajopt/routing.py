@@ -128,7 +128,7 @@ def _not_quadratic(problem: Problem) -> str:
     if problem.limits.rms_force is not None:
         return "an RMS limit is a second-order cone"
     norms_used = [term.norm for term in problem.objective.terms if term.norm]
-    if any(term.norm and term.norm.name == "l2" for term in problem.objective.all_terms[len(problem.objective.terms) :]):
+    if any(ceiling.norm and ceiling.norm.name == "l2" for ceiling in problem.objective.ceilings or ()):
         return "a ceiling on an l2 norm is a second-order cone"
     if len(norms_used) > 1 and any(norm.name == "l2" for norm in norms_used):
         return "an l2 norm in a weighted sum is a second-order cone"

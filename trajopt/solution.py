@@ -178,8 +178,6 @@ class Solution:
 
         Without a solution only result.json is written. Raises OSError.
         """
-        from trajopt.table import write_csv
-
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)
         pictures: dict[str, Callable[[], Any]] = {
@@ -188,14 +186,11 @@ class Solution:
             "vibration.png": self.plot_vibration,
             "arcs.png": lambda: self.plot_arcs()[0],
         }
-        written = [directory / "result.json"]
-        for stale in ("trajectory.csv", *pictures):  # of another answer
+        for stale in pictures:  # of another answer
             (directory / stale).unlink(missing_ok=True)
-        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
+        written = self.save_data(directory)
         if self.trajectory is None:
             return written
-        written.append(directory / "trajectory.csv")
-        write_csv(self, written[-1])
         if not self.problem.vibration:
             del pictures["vibration.png"]
         if self.route.model != "arcs":
@@ -204,6 +199,20 @@ class Solution:
             figure: Any = draw().figure
             figure.savefig(directory / name, dpi=150)
             written.append(directory / name)
+        return written
+
+    def save_data(self, directory: Path) -> list[Path]:
+        """Write result.json and, with a solution, trajectory.csv into ``directory``; returns the paths. Raises
+        OSError."""
+        from trajopt.table import write_csv
+
+        directory.mkdir(parents=True, exist_ok=True)
+        written = [directory / "result.json", directory / "trajectory.csv"]
+        written[1].unlink(missing_ok=True)
+        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
+        if self.trajectory is None:
+            return written[:1]
+        write_csv(self, written[1])
         return written
 
     def __repr__(self) -> str:

@@ -11,13 +11,20 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Final, TypeVar
+
+from trajopt.errors import TrajoptError
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PRELOADED: Final = ["trajopt.solving", "trajopt.model_cvxpy"]
+
+
+class WorkerDied(TrajoptError):
+    """A process ended before its job did."""
 
 
 class Here:
@@ -46,10 +53,15 @@ class Processes:
         self._pool = ProcessPoolExecutor(count, mp_context=context, initializer=_deaf)
 
     def run(self, work: Callable[[Job], Answer], jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
-        """(position of the job, its answer), as they are done. Raises what a job raises."""
-        futures = {self._pool.submit(work, job): k for k, job in enumerate(jobs)}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        """(position of the job, its answer), as they are done. Raises what a job raises, and WorkerDied."""
+        try:
+            futures = {self._pool.submit(work, job): k for k, job in enumerate(jobs)}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool:
+            raise WorkerDied(
+                'a solving process died; a script that asks for workers starts below if __name__ == "__main__":'
+            ) from None
 
     def __enter__(self) -> Processes:
         return self

@@ -91,7 +91,8 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
         coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
         viscous=_number(load.get("viscous", 0.0), "load.viscous"),
         motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
-        terms=terms, ceilings=ceilings, move_time=_move_time(move.get("time")), intervals=_whole(grid.get("intervals"), "intervals"),
+        terms=terms, ceilings=ceilings, move_time=_move_time(move.get("time")),
+        intervals=_whole(grid.get("intervals"), "intervals"),
         objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
         metrics={
             str(name): _number(value, f"metrics.{name}")

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Final
 
 import numpy as np
 
+from trajopt.fronts import geometry
+from trajopt.fronts.blends import blends
+from trajopt.fronts.front import Front, Point, ranges
+from trajopt.fronts.geometry import Gap, Outside
+from trajopt.fronts.scalarise import Answer, Task, answer, is_convex
 from trajopt.mesh import Floats
-from trajopt.pareto import geometry
-from trajopt.pareto.blends import blends
-from trajopt.pareto.front import Front, Point, ranges
-from trajopt.pareto.geometry import Gap, Outside
-from trajopt.pareto.scalarise import Answer, Task, answer, is_convex
 from trajopt.problem import Problem, Term
 from trajopt.verdict import Verdict
 from trajopt.workers import Here, Processes
@@ -140,8 +139,8 @@ class Search:
 
         ideal, nadir = self._ends
         rounded = np.round((np.array([p.values for p in found]) - ideal) / ranges(ideal, nadir) / _SAME)
-        kept = is_nondominated(rounded, keep_weakly=self.request.points is not None)
-        return sorted(zip(found, kept.tolist(), strict=True), key=lambda pair: pair[0].values)
+        kept: list[bool] = is_nondominated(rounded, keep_weakly=self.request.points is not None).tolist()
+        return sorted(zip(found, kept, strict=True), key=lambda pair: pair[0].values)
 
     def _outside(self) -> Outside:
         ideal, nadir = self._ends
@@ -182,12 +181,14 @@ class Search:
         gaps = self.gaps()
         return max(gaps[0].error, 0.0) if gaps and np.isfinite(gaps[0].error) else None
 
-    def front(self) -> Front:
+    def front(self, interrupted: bool = False) -> Front:
         """What is known by now."""
         found = self._sorted()
         unsolved = tuple(x.solution for x in self.answers if x.values is None)
         error = self.error()
         status, message = self._verdict(error, len(unsolved))
+        if interrupted:
+            status, message = Verdict.INTERRUPTED, f"stopped by the user after {len(self.answers)} solves"
         ideal, nadir = (tuple(x.tolist()) for x in self._ends) if found else ((), ())
         return Front(
             self.problem, self.terms, status, message,

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from trajopt.errors import BadInput
 from trajopt.fields import nearest
-from trajopt.pareto.front import Front
-from trajopt.pareto.objectives import in_one_class, read
-from trajopt.pareto.search import MOST, Progress, Request, Search
+from trajopt.fronts.front import Front
+from trajopt.fronts.objectives import in_one_class, read
+from trajopt.fronts.search import MOST, Progress, Request, Search
 from trajopt.problem import Problem, Term
 from trajopt.workers import Here, Processes
 
@@ -35,15 +35,16 @@ def pareto(
     solve at once; which points are solved does not depend on them. Raises BadInput.
     """
     search = prepare(problem, objectives, points=points, error=error, method=method)
-    with hands(workers) as at_work:
-        return search(at_work, lambda *_: None).run()
+    check_workers(workers)
+    with Here() if workers == 1 else Processes(workers) as at_work:
+        front: Front = search(at_work, lambda *_: None).run()
+        return front
 
 
-def hands(workers: int) -> Here | Processes:
-    """Who solves: this process, or so many others. Raises BadInput."""
-    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= 256:
+def check_workers(workers: Any) -> None:
+    """Raise BadInput unless so many processes can be meant."""
+    if type(workers) is not int or not 1 <= workers <= 256:
         raise BadInput(f"workers: must be a whole number, 1 to 256, got {workers!r}")
-    return Here() if workers == 1 else Processes(workers)
 
 
 def prepare(
@@ -77,9 +78,9 @@ def _request(points: int | None, error: float | None, method: str) -> Request:
         raise BadInput(f"method: unknown {str(method)[:60]!r}; one of {', '.join(METHODS)}{hint}")
     if points is not None and error is not None:
         raise BadInput("points: give either points or error, not both; error places as many points as it takes")
-    if points is not None and (isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST):
+    if points is not None and (type(points) is not int or not 2 <= points <= MOST):
         raise BadInput(f"points: must be a whole number, 2 to {MOST}, got {points!r}; 21 are usual")
-    if error is not None and (isinstance(error, bool) or not isinstance(error, int | float) or not 1e-5 <= error <= 0.5):
+    if error is not None and (type(error) not in (int, float) or not 1e-5 <= error <= 0.5):
         raise BadInput(f"error: must be 0.001 % to 50 % (0.00001 to 0.5), got {error!r}; 0.5 % is usual")
     asked = DEFAULT_ERROR if points is None and error is None else error
     return Request(method, points, asked)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trajopt.fronts.objectives import friendly, unit
+from trajopt.fronts.scalarise import Plane
 from trajopt.mesh import Floats
-from trajopt.pareto.objectives import friendly, unit
-from trajopt.pareto.scalarise import Plane
 from trajopt.problem import Problem, Term
-from trajopt.solution import Solution
+from trajopt.solution import Solution, seal
 from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Front:
     """What `trajopt.pareto` returns.
 
     ``points``: the nondominated ones, by the first objective; ``dropped``: dominated ones; ``unsolved``: solutions
-    without a move. ``planes`` and ``corners`` bound the front from outside (see `trajopt.pareto.geometry`), SI.
+    without a move. ``planes`` and ``corners`` bound the front from outside (see `trajopt.fronts.geometry`), SI.
     ``error``: how well the front is known, in shares of the ranges between the anchors, None where no bound is known;
     ``asked``: how well it should be. ``blends``: how many moves between neighbours were measured to know it.
     ``status``: SOLVED when every point is solved and the asked error is certified, else UNDECIDED, and ``message`` says
@@ -103,7 +103,8 @@ class Front:
     @property
     def normalised(self) -> Floats:
         """(n, m): 0 at the best and 1 at the worst anchor in every objective."""
-        return (self.values - np.array(self.ideal)) / ranges(self.ideal, self.nadir)
+        normalised: Floats = (self.values - np.array(self.ideal)) / ranges(self.ideal, self.nadir)
+        return normalised
 
     @property
     def anchors(self) -> tuple[int, ...]:
@@ -112,7 +113,7 @@ class Front:
 
     @property
     def knee(self) -> int | None:
-        """The point farthest in from the line, or plane, through the anchors, normalised; None where none lies inside."""
+        """The point farthest inside the line, or plane, through the anchors, normalised; None where none is inside."""
         if len(self.points) <= len(self.terms):
             return None
         y = self.normalised
@@ -141,8 +142,8 @@ class Front:
 
     @property
     def frame(self) -> pd.DataFrame:
-        """One row a point; see `trajopt.pareto.output.frame`."""
-        from trajopt.pareto.output import frame
+        """One row a point; see `trajopt.fronts.output.frame`."""
+        from trajopt.fronts.output import frame
 
         return frame(self)
 
@@ -154,14 +155,18 @@ class Front:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of front.json, without its seal."""
-        from trajopt.pareto.output import to_dict
+        from trajopt.fronts.output import to_dict
 
         return to_dict(self)
+
+    def sealed(self) -> dict[str, Any]:
+        """`to_dict` with its seal (see `trajopt.Solution.sealed`)."""
+        return seal(self.to_dict())
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write front.json, front.csv, front.png and a folder a point with its result and profile; returns the paths.
         Raises OSError."""
-        from trajopt.pareto.output import save
+        from trajopt.fronts.output import save
 
         return save(self, Path(directory))
 
@@ -170,8 +175,9 @@ class Front:
         return f"<Front {self.status.value}: {len(self.points)} points of {' and '.join(self.names)}{known}>"
 
 
-def ranges(ideal: Sequence[float], nadir: Sequence[float]) -> Floats:
+def ranges(ideal: Sequence[float] | Floats, nadir: Sequence[float] | Floats) -> Floats:
     """(m,) what every objective is divided by: its range between the anchors or, where they agree, its own size."""
     low, high = np.array(ideal), np.array(nadir)
     size = np.maximum(np.abs(high), 1e-300)
-    return np.where(high - low > 1e-6 * size, high - low, size)
+    found: Floats = np.where(high - low > 1e-6 * size, high - low, size)
+    return found

@@ -1,4 +1,4 @@
-"""Which objectives a front is between: friendly names such as ``peak_power``, or a signal and a norm: ``power linf``."""
+"""Which objectives a front is between: friendly names such as ``peak_power``, or a signal and its norm, ``power l2``."""
 
 from __future__ import annotations
 
