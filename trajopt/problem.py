@@ -296,7 +296,7 @@ def _ceiling(value: Any, info: ValidationInfo) -> float:
         return 1.0  # refused below, in better words
     kind = Term(minimize=of, norm=norm).kind
     if kind is None and isinstance(value, str):
-        raise ValueError(f"a {norm.name} norm of {of} has no unit in files; take linf or l2")
+        raise ValueError(f"the {getattr(norm, 'name', '')} norm of {of} has no unit in files; take linf or l2")
     bound = si(value, kind or of, info)
     if bound <= 0:
         raise ValueError(f"must be > 0, got {shown(value)}")

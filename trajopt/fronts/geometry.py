@@ -72,9 +72,9 @@ def _below_hull(points: Floats, vertex: Floats) -> Gap:
     shares = np.append(np.ones(count), 0.0)[None, :]
     bounds = [(0.0, None)] * count + [(None, None)]
     found = linprog(cost, A_ub=rows, b_ub=vertex, A_eq=shares, b_eq=[1.0], bounds=bounds, method="highs")
-    if found.status != 0:
+    if found.x is None:
         raise RuntimeError(f"the distance of a vertex from the hull: {found.message}")
-    return Gap(float(found.fun), np.abs(np.asarray(found.ineqlin.marginals, dtype=float)))
+    return Gap(float(found.x[-1]), np.abs(np.asarray(found.ineqlin.marginals, dtype=float)))
 
 
 def staircase_gaps(points: Floats, between: list[Floats], outside: Outside) -> list[Gap]:

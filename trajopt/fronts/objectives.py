@@ -1,4 +1,4 @@
-"""Which objectives a front is between: friendly names such as ``peak_power``, or a signal and its norm, ``power l2``."""
+"""Which objectives a front is between: friendly names such as ``peak_power``, or a signal and norm, ``power l2``."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _term(name: str) -> Term:
         close = nearest(name.strip().replace(" ", "_"), _known())
         hint = close if "did you mean" in close else "; write for example energy, peak_power, jerk_l2 or time"
         raise BadInput(f"objectives: unknown {units.shown(name.strip())}{hint}")
-    return Term(minimize=signal, norm=norm)
+    return Term(minimize=signal, norm=norms.get(norm))
 
 
 def _known() -> list[str]:

@@ -17,6 +17,7 @@ from trajopt.problem import Ceiling, Objective, Problem, Term
 from trajopt.routing import has_power_bound, nonaffine_limits, route_on_mesh
 from trajopt.solution import Solution
 from trajopt.ties import HELD
+from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, without
 
 
@@ -30,8 +31,8 @@ class Plane:
 
 @dataclass(frozen=True)
 class Task:
-    """What to solve: ``weights`` (SI, zero where an objective is left out), or the ``first`` objective with ceilings on
-    the others; ``kind`` is anchor, weights or epsilon."""
+    """What to solve: ``weights`` (SI, zero where an objective is left out), or the least of objective ``minimized``
+    with ``ceilings`` on the others; ``kind`` is anchor, weights or epsilon."""
 
     problem: Problem
     terms: tuple[Term, ...]
@@ -39,6 +40,7 @@ class Task:
     weights: tuple[float, ...] = ()
     minimized: int = 0
     ceilings: tuple[float | None, ...] = ()
+    start: Trajectory | None = None  # the answer of a neighbour
 
 
 @dataclass(frozen=True)
@@ -66,10 +68,11 @@ def measured(solution: Solution, terms: Sequence[Term]) -> tuple[float, ...] | N
     return tuple(solution.trajectory.measure(Objective(terms=(term,))) for term in terms)
 
 
-def _solve(problem: Problem, terms: Sequence[Term], ceilings: Sequence[Ceiling] = ()) -> Solution:
+def _solve(task: Task, terms: Sequence[Term], ceilings: Sequence[Ceiling] = ()) -> Solution:
     from trajopt.solving import solve
 
-    return solve(problem.replace(objective=Objective(terms=tuple(terms), ceilings=tuple(ceilings) or None)))
+    objective = Objective(terms=tuple(terms), ceilings=tuple(ceilings) or None)
+    return solve(task.problem.replace(objective=objective), start=task.start)
 
 
 def _weighted_terms(task: Task, weights: Sequence[float]) -> list[Term]:
@@ -84,7 +87,7 @@ def _plane(solution: Solution, weights: Sequence[float]) -> tuple[Plane, ...]:
 
 def _weighted(task: Task) -> Answer:
     """The least weighted sum (Clemen & Rupp eq. 26)."""
-    solution = _solve(task.problem, _weighted_terms(task, task.weights))
+    solution = _solve(task, _weighted_terms(task, task.weights))
     planes = _plane(solution, task.weights)
     return Answer(task, solution, measured(solution, task.terms), planes, weights=task.weights)
 
@@ -93,7 +96,7 @@ def _anchor(task: Task) -> Answer:
     """The least of one objective, and of the others in turn with those before held, while the move is undetermined."""
     order = [task.minimized, *(k for k in range(len(task.terms)) if k != task.minimized)]
     weights = tuple(float(k == task.minimized) for k in range(len(task.terms)))
-    solution = _solve(task.problem, [task.terms[task.minimized]])
+    solution = _solve(task, [task.terms[task.minimized]])
     planes = _plane(solution, weights)
     for k, term in enumerate([task.terms[k] for k in order[1:]], 1):
         values = measured(solution, task.terms)
@@ -101,7 +104,7 @@ def _anchor(task: Task) -> Answer:
             break
         for share in HELD if solution.route.model == "cvxpy" else (1e-7,):
             held = [_ceiling(task.terms[i], values[i] * (1 + share)) for i in order[:k]]
-            second = _solve(task.problem, [term], held)
+            second = _solve(task, [term], held)
             if second.status.solved:
                 solution = second
                 break
@@ -117,7 +120,7 @@ def _held(task: Task) -> Answer:
     pairs = zip(task.terms, task.ceilings, strict=True)
     held = [_ceiling(term, most) for term, most in pairs if most is not None]
     minimized = task.terms[task.minimized]
-    solution = _solve(task.problem, [minimized], held)
+    solution = _solve(task, [minimized], held)
     values, bound = measured(solution, task.terms), solution.certificate.get("lower_bound")
     if values is None:
         return Answer(task, solution)

@@ -81,7 +81,9 @@ class Search:
 
     def _task(self, kind: str, weights: tuple[float, ...] = (), ceilings: tuple[float | None, ...] = ()) -> Task:
         minimized = ceilings.index(None) if ceilings else 0
-        return Task(self.problem, self.terms, kind, weights, minimized, ceilings)
+        nearest = max(range(len(weights)), key=lambda k: weights[k], default=minimized)
+        starts = [x.solution.trajectory for x in self.answers if x.task.minimized == nearest]
+        return Task(self.problem, self.terms, kind, weights, minimized, ceilings, starts[0] if starts else None)
 
     def _ceiling(self, most: float) -> Task:
         return self._task("epsilon", ceilings=(most, None))
