@@ -1,4 +1,4 @@
-"""Pareto fronts: placed until known within the asked error, which nothing we can find contradicts; as files, checked."""
+"""Pareto fronts: known within the asked error, which nothing that we can find contradicts; as files, checked again."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from trajopt.fronts.geometry import Outside
 from trajopt.fronts.output import FORMAT
 from trajopt.fronts.tracing import prepare
 from trajopt.plot_front import plot_front
+from trajopt.workers import Here
 
 EXACT_FRONT = {.83: 5.307679, .91: 2.984933, 1.15: 1.903022, 1.55: 1.683335}  # J: W, computed independently
 CONTINUOUS_FRONT = {.82: 6.218145347, .90: 3.111852280, 1.00: 2.305870291, 1.20: 1.836031137, 1.50: 1.687165811}
@@ -128,6 +130,38 @@ def test_three_objectives() -> None:
     assert front.status is trajopt.Verdict.SOLVED and front.values.shape[1] == 3 and front.error <= 0.1  # type: ignore[operator]
     assert len(set(front.anchors)) == 3
     assert plot_front(front).figure.axes[0].get_xlabel().startswith("peak velocity")
+
+
+def test_time_against_energy_never_rises() -> None:
+    front = trajopt.pareto(SMALL, "time,energy", points=5)
+    assert front.status is trajopt.Verdict.SOLVED and len(front.points) == 5 and front.error is not None
+    assert np.all(np.diff(front.values[:, 0]) > 0) and np.all(np.diff(front.values[:, 1]) < 0)
+    least = solved(SMALL.replace(move=SMALL.move.model_copy(update={"time": "free"}),
+                                 objective=trajopt.Objective(terms=(term("time"),))))  # fmt: skip
+    assert front.values[0, 0] == pytest.approx(least.duration, rel=1e-9) and front.values[-1, 0] == 1.0
+    exact = 10 * np.square(front.points[2].solution.metrics["peak_velocity"])
+    assert front.values[2, 1] == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("mended", [True, False])
+def test_a_cost_that_rises_with_time_is_solved_again_or_flagged(mended: bool) -> None:
+    class Liar(Here):
+        """Claims too much energy for the middle time, by one solver or by all."""
+
+        def run(self, work: Any, jobs: Any) -> Any:
+            for k, found in super().run(work, jobs):
+                again = found.task.problem.transcription.solver == "ipopt"
+                wrong = found.task.kind == "time" and not (again and mended)
+                yield k, replace(found, values=(found.values[0], 5.0)) if wrong else found
+
+    coarse = table_i("energy", intervals=20)
+    front = prepare(coarse, "time,energy", points=3)(Liar(), lambda *_: None).run()
+    if mended:
+        assert front.status is trajopt.Verdict.SOLVED and len(front.points) == 3
+        assert front.points[1].solution.route.solver == "ipopt"
+    else:
+        assert front.status is trajopt.Verdict.UNDECIDED and len(front.points) == 2
+        assert "a faster move" in front.message and front.unsolved[0].objective is None
 
 
 def test_workers_change_nothing() -> None:
@@ -322,6 +356,7 @@ BAD: list[tuple[dict[str, Any], tuple[str, ...]]] = [
     ({"error": float("nan")}, ("error", "0.001 % to 50 %")),
     ({"method": "epsilom"}, ("epsilom", "did you mean 'epsilon'")),
     ({"method": "epsilon", "objectives": "energy,peak_power,jerk_l2"}, ("two objectives",)),
+    ({"objectives": "time,energy", "method": "epsilon"}, ("time by time",)),
     ({"objectives": "energy,copper_loss"}, ("torque_constant", "missing")),
 ]
 

@@ -63,7 +63,7 @@ def front_checks(path: Path, stated: Mapping[str, Any]) -> tuple[list[Check], li
     notes: list[str] = []
     try:
         entries = _entries(stated)
-        checks, cases, own = _points(path.parent, entries, notes)
+        checks, cases, own = _points(path.parent, stated, entries, notes)
         front = _front(stated, cases)
     except (Malformed, CheckerInputError, TypeError, ValueError, KeyError) as fault:
         return [question("structure", f"this is no front: {fault}")], notes
@@ -86,7 +86,7 @@ def _entries(stated: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _points(
-    folder: Path, entries: list[Mapping[str, Any]], notes: list[str]
+    folder: Path, stated: Mapping[str, Any], entries: list[Mapping[str, Any]], notes: list[str]
 ) -> tuple[list[Check], list[Case], list[tuple[Any, float | None]]]:
     """The check of each point's result; its case; the weights and the lower bound that it states."""
     checks, cases, own = [], [], []
@@ -101,7 +101,8 @@ def _points(
             raise Malformed(f"{entry['result']} is no solution")
         cases.append(case)
         own.append(({(name, norm): weight for name, norm, weight in case.terms}, case.lower_bound))
-    problems = {(case.scheme, case.order, case.count, case.end_time) for case in cases}
+    timed = any(objective["minimize"] == "time" for objective in stated["objectives"])
+    problems = {(case.scheme, case.order, case.count, timed or case.end_time) for case in cases}
     checks.append(question("one mesh", "" if len(problems) <= 1 else "the points are moves on different meshes"))
     return checks, cases, own
 
@@ -238,6 +239,8 @@ def _blended(front: _Front, count: int) -> list[Array]:
     order = sorted(range(front.kept), key=lambda k: tuple(front.values[k]))
     found = []
     for i, j in zip(order, order[1:], strict=False):
+        if front.cases[i].end_time != front.cases[j].end_time:
+            continue  # moves of different durations cannot be blended
         first, second = front.cases[i], front.cases[j]
         for k in range(1, count + 1):
             share = k / (count + 1)

@@ -13,12 +13,15 @@ import numpy as np
 
 from trajopt.attempt import Clock, convex, to
 from trajopt.power import relax
-from trajopt.problem import Ceiling, Objective, Problem, Term
+from trajopt.problem import DERIVATIVES, FREE, Ceiling, Objective, Problem, Term
 from trajopt.routing import has_power_bound, nonaffine_limits, route_on_mesh
 from trajopt.solution import Solution
 from trajopt.ties import HELD
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, without
+
+_OURS: Final = ("l1", "l2", "linf")
+_INERTIAL: Final = {"force", "power", "energy", "current", "envelope", "rms_force"}
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class Task:
     minimized: int = 0
     ceilings: tuple[float | None, ...] = ()
     start: Trajectory | None = None  # the answer of a neighbour
+    duration: float | None = None  # s, where time is an objective; None for the least
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class Answer:
 
 def answer(task: Task) -> Answer:
     """Solve a task, in this process."""
+    if any(term.minimize == "time" for term in task.terms):
+        return _timed(task)
     return {"anchor": _anchor, "weights": _weighted, "epsilon": _held}[task.kind](task)
 
 
@@ -133,6 +139,47 @@ def _held(task: Task) -> Answer:
     value = lower_bound(_reweighted(task, weights))
     planes = (Plane(weights, value),) if np.isfinite(value) else ()
     return Answer(task, solution, values, planes, corners, weights)
+
+
+def _timed(task: Task) -> Answer:
+    """The least time, or the least cost in a given time: also a bound for shorter ones where moves can be stretched."""
+    from trajopt.solving import solve
+
+    time = FREE if task.duration is None else task.duration
+    move = task.problem.move.model_copy(update={"time": time})
+    objective = Objective(terms=(task.terms[task.minimized],))
+    solution = solve(task.problem.replace(move=move, objective=objective))
+    values, bound = measured(solution, task.terms), solution.certificate.get("lower_bound")
+    if values is None or bound is None or not (task.duration is None or stretches(task.problem, task.terms)):
+        return Answer(task, solution, values)
+    if task.kind == "anchor":
+        weights = tuple(float(k == task.minimized) for k in range(len(task.terms)))
+        return Answer(task, solution, values, (Plane(weights, bound),), weights=_slopes(task, solution))
+    corner = tuple(bound if k == task.minimized else values[k] for k in range(len(task.terms)))
+    return Answer(task, solution, values, corners=(corner,), weights=_slopes(task, solution))
+
+
+def _slopes(task: Task, solution: Solution) -> tuple[float, ...] | None:
+    """The half-plane that touches the front at a given time, from the price of the time."""
+    found = {row["name"]: max(-row["per_unit"], 0.0) for row in solution.prices}
+    if task.duration is None or "time" not in found:
+        return None
+    return tuple(found["time"] if term.minimize == "time" else 1.0 for term in task.terms)
+
+
+def stretches(problem: Problem, terms: Sequence[Term]) -> bool:
+    """Whether a move stretched in time keeps all limits and costs no more: from rest to rest, without tables, vias and
+    modes. With a load only where nothing acts but the inertia: the parts of a sum fall, but by different factors."""
+    move, limits = problem.move, problem.limits.given()
+    ends = [state.fixed(problem.order) for state in (move.start, move.end)]
+    rest = all(state.get(i) == 0.0 for state in ends for i in range(1, problem.order))
+    around_zero = all(x.lowest <= 0 <= x.highest for name, x in limits.items() if name != "position")
+    plain = not (move.via or problem.vibration or any(x.varies for x in limits.values()))
+    known = all(term.minimize != "position" and (term.norm is None or term.norm.name in _OURS) for term in terms)
+    named = {*limits, *(term.minimize for term in terms)} - {*DERIVATIVES, "time"}
+    load = problem.load
+    inertial = isinstance(load.inertia, float) and not (load.coulomb or load.viscous)
+    return rest and around_zero and plain and known and (not named or (inertial and named <= _INERTIAL))
 
 
 def _reweighted(task: Task, weights: Sequence[float]) -> Problem:

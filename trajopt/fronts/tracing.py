@@ -10,11 +10,13 @@ from trajopt.fields import nearest
 from trajopt.fronts.front import Front
 from trajopt.fronts.objectives import in_one_class, read
 from trajopt.fronts.search import MOST, Progress, Request, Search
+from trajopt.fronts.time_search import TimeSearch
 from trajopt.problem import Problem, Term
 from trajopt.workers import Here, Processes
 
 METHODS: Final = ("weights", "epsilon")
 DEFAULT_ERROR: Final = 0.005
+TIMES: Final = 11  # points where time is an objective: nothing is blended there, and each per cent takes many
 
 
 def pareto(
@@ -64,10 +66,15 @@ def prepare(
         raise BadInput("method: epsilon takes two objectives; use weights for three")
     if problem.move.fixed_time is None:
         raise BadInput('move.time: a front needs a fixed time such as "1 s"; with time as an objective, its longest')
+    timed = any(term.minimize == "time" for term in terms)
+    if timed and (len(terms) > 2 or request.method == "epsilon"):
+        raise BadInput("objectives: time is traced against one other objective, time by time; leave method out")
+    if timed and points is None and error is None:
+        request = Request(points=TIMES)
     whole = in_one_class(problem, terms)
 
     def made(at_work: Here | Processes, progress: Progress) -> Search:
-        return Search(whole, terms, request, at_work, progress)
+        return (TimeSearch if timed else Search)(whole, terms, request, at_work, progress)
 
     return made
 
