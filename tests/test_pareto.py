@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 import signal
@@ -17,7 +16,7 @@ import numpy as np
 import pytest
 
 import trajopt
-from tests.conftest import PUBLISHED_CURVES, axis, solved, table_i, term
+from tests.conftest import axis, solved, table_i, term
 from tests.test_cli import TABLE_I, run
 from trajopt.fronts import geometry
 from trajopt.fronts.blends import blend
@@ -186,18 +185,6 @@ def test_bounds_that_are_missing_are_not_made_up() -> None:
     front = trajopt.pareto(problem, "energy,peak_power", error=0.3)
     assert front.status is trajopt.Verdict.UNDECIDED and front.error is None
     assert "no lower bound" in front.message and len(front.points) == 2
-
-
-@pytest.mark.skipif(not PUBLISHED_CURVES.exists(), reason="published curves are not part of the repository")
-def test_points_of_figure_7() -> None:
-    """Every tenth weight; `problems.clemen_rupp` draws all 51."""
-    with (PUBLISHED_CURVES / "fig7_pareto_front.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    published = np.array([[float(x) for x in row.values()] for row in rows])
-    front = trajopt.pareto(table_i("energy", scheme="euler"), "energy,power linf", points=6)
-    ratios = front.values / front.values.min(axis=0)
-    assert front.status is trajopt.Verdict.SOLVED and len(front.points) == 6
-    assert np.max(np.abs(ratios / published[::-1][::10] - 1)) <= 1e-3
 
 
 class TestGeometry:
