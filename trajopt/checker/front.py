@@ -63,6 +63,8 @@ def front_checks(path: Path, stated: Mapping[str, Any]) -> tuple[list[Check], li
     notes: list[str] = []
     try:
         entries = _entries(stated)
+        if not entries:
+            return [question("structure")], ["a front without points"]
         checks, cases, own = _points(path.parent, stated, entries, notes)
         front = _front(stated, cases)
     except (Malformed, CheckerInputError, TypeError, ValueError, KeyError) as fault:

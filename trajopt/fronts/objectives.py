@@ -58,7 +58,9 @@ def friendly(term: Term, problem: Problem) -> str:
     name = problem.shown(term.minimize).replace("_", " ")
     if term.norm is None:
         return name
-    words = {"linf": f"peak {name}", "l2": f"RMS {name}"} if problem.transcription.scheme == "exact" else {}
+    words = {"linf": f"peak {name}"}
+    if problem.transcription.scheme == "exact":  # else it is a plain sum
+        words["l2"] = f"RMS {name}"
     return words.get(term.norm.name, f"{name} {term.norm.name}")
 
 
