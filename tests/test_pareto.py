@@ -203,7 +203,7 @@ class TestGeometry:
 
     def truth(self, outside: Outside) -> float:
         """The error, by brute force: how far each place that no bound excludes is from the hull."""
-        grid = np.linspace(-0.05, 1.05, 441)
+        grid = np.linspace(-0.05, 1.05, 221)
         places = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
         places = places[np.all(places @ outside.weights.T >= outside.values, axis=1)]
         hull = np.column_stack([grid, np.interp(grid, *self.points.T)])[(grid >= 0) & (grid <= 1)]
@@ -212,7 +212,7 @@ class TestGeometry:
     def test_hull(self) -> None:
         outside = self.outside([0.05, 0.3, 0.6])
         gaps = geometry.hull_gaps(self.points, outside)
-        assert gaps[0].error == pytest.approx(self.truth(outside), abs=4e-3)
+        assert gaps[0].error == pytest.approx(self.truth(outside), abs=6e-3)
         assert np.all(gaps[0].weights >= 0) and np.sum(gaps[0].weights) == pytest.approx(1.0)
 
     def test_staircase_of_blends_comes_near_the_hull(self) -> None:
@@ -320,7 +320,7 @@ def test_an_interrupt_keeps_what_is_finished(move: Path, tmp_path: Path) -> None
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    time.sleep(7)
+    time.sleep(5)
     child.send_signal(signal.SIGINT)
     _, error = child.communicate(timeout=30)
     assert child.returncode == 130 and error.strip() == "trajopt: stopped by the user"

@@ -21,6 +21,7 @@ from trajopt.workers import Here, Processes
 
 MOST: Final = 200  # solves
 _SAME: Final = 1e-6  # weights, normalised, and points this close are one
+_LEAST: Final = 1e-3  # weight, of the largest: with none at all the others could be anything
 _BLENDS: Final = 64  # at least, between two neighbours
 
 Progress = Callable[[int, "float | None"], None]
@@ -100,8 +101,9 @@ class Search:
     def _into(self, gap: Gap) -> Task | None:
         """The task that looks into a gap; None where it has been looked at."""
         if self.request.method == "weights":
-            weights = gap.weights / max(float(np.sum(gap.weights)), 1e-300)
-            if np.min(weights) > _SAME and not self._known(weights):
+            weights = np.maximum(gap.weights, _LEAST * float(np.max(gap.weights)))
+            weights = weights / float(np.sum(weights))
+            if not self._known(weights):
                 si = weights / ranges(*self._ends)
                 return self._task("weights", weights=tuple(float(w) for w in si / np.sum(si)))
         if self.convex or gap.between is None:
