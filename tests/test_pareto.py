@@ -373,6 +373,8 @@ CEILINGS = [
     ('{ of = "time", at_most = "1 s" }', ("of", "move.time")),
     ('{ of = "power", at_most = "1 W" }', ("norm", "is missing")),
     ('{ of = "energy" }', ("objective.ceilings[0].at_most", "is missing")),
+    ('{ off = "energy", at_most = "1 J" }', ("objective.ceilings[0].off", "did you mean 'of'")),
+    ('"energy"', ("objective.ceilings[0]", "of, norm, at_most")),
     ('{ of = "position", norm = "l1", at_most = "1 m" }', ("no unit in files",)),
 ]
 

@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -324,14 +324,20 @@ def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
     for part in loc:
         if isinstance(part, int):
             continue
-        annotation = model.model_fields[part].annotation
-        models = [a for a in (annotation, *getattr(annotation, "__args__", ())) if isinstance(a, type)]
+        models = [a for a in _named_in(model.model_fields[part].annotation) if isinstance(a, type)]
         model = next((m for m in models if issubclass(m, BaseModel)), None)
         if model is None:
             return []
     aliases = _ALIASES.get(str(loc[-1]), {}) if loc else {}
     extra = ["minimize", "norm", "weight"] if model is p.Objective else ["plant"] if model is p.Problem else []
     return [*model.model_fields, *aliases, *extra]
+
+
+def _named_in(annotation: Any) -> Iterator[Any]:
+    """An annotation and all that it is made of."""
+    yield annotation
+    for part in getattr(annotation, "__args__", ()):
+        yield from _named_in(part)
 
 
 def _refused(name: str, message: str) -> BadInput:
