@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from trajopt.fronts.front import outside
 from trajopt.mesh import Floats
 from trajopt.plot import COLOURS, GREY, SHADE
 
@@ -19,33 +20,46 @@ _MARGIN: Final = 0.06
 
 
 def plot_front(front: Front, reference: Any = None) -> Axes:
-    """Two objectives: the points, the certified band, anchors and knee, normalised axes above and right, SI below and
-    left. Three: every pair of them side by side. ``reference``: (n, 2) values in SI of another front, for comparison.
+    """Two objectives: the points, the certified band, anchors and knee, SI below and left, relative to the least above
+    and right; beneath, where an error is known, how wide the band is. Three: every pair of them side by side.
 
-    Raises ValueError for a front without points.
+    ``reference``: (n, 2) values in SI of another front, for comparison. Raises ValueError for a front without points.
     """
     if not front.points:
         raise ValueError("a front without points cannot be drawn")
-    count = len(front.terms)
-    if count == 2:
-        figure = Figure(figsize=(7.0, 4.8), layout="constrained", facecolor="white")
-        axes = figure.subplots()
-        _pair(front, axes, 0, 1)
-        _band(front, axes)
-        if reference is not None:
-            x, y = np.asarray(reference, dtype=float).T
-            axes.plot(x, y, "+", color=COLOURS[1], markersize=7, label="published", zorder=4)
-        _second_axes(front, axes)
-        axes.legend(frameon=False, fontsize=8, loc="upper right")
-        _title(front, axes)
-        return axes
+    return _two(front, reference) if len(front.terms) == 2 else _three(front)
+
+
+def _two(front: Front, reference: Any) -> Axes:
+    known = front.error is not None
+    figure = Figure(figsize=(7.0, 5.8 if known else 4.8), layout="constrained", facecolor="white")
+    panels: list[Axes] = figure.subplots(
+        1 + known, 1, sharex=True, squeeze=False, height_ratios=[5, 1][: 1 + known]
+    )[:, 0].tolist()
+    axes = panels[0]
+    _pair(front, axes, 0, 1)
+    _band(front, axes)
+    for strip in panels[1:]:
+        _strip(front, strip)
+        strip.set_xlabel(axes.get_xlabel(), fontsize=9)
+        axes.set_xlabel("")
+    if reference is not None:
+        x, y = np.asarray(reference, dtype=float).T
+        axes.plot(x, y, "+", color=COLOURS[1], markersize=7, label="reference", zorder=4)
+    _second_axes(front, axes)
+    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    _title(front, axes)
+    return axes
+
+
+def _three(front: Front) -> Axes:
     figure = Figure(figsize=(11.0, 4.0), layout="constrained", facecolor="white")
-    panels = figure.subplots(1, 3)
+    panels: list[Axes] = figure.subplots(1, 3).tolist()
     for axes, (i, j) in zip(panels, ((0, 1), (0, 2), (1, 2)), strict=True):
         _pair(front, axes, i, j)
     panels[0].legend(frameon=False, fontsize=8, loc="upper right")
     _title(front, panels[0])
-    return axes
+    return panels[0]
 
 
 def _title(front: Front, axes: Axes) -> None:
@@ -84,16 +98,41 @@ def _band(front: Front, axes: Axes) -> None:
     low, high = np.array(front.ideal), np.array(front.nadir)
     room = _MARGIN * np.where(high > low, high - low, np.abs(high))
     x = np.linspace(low[0], high[0], _SAMPLES)
-    outer, inner = _outer(front, x), np.interp(x, *front.values.T)
+    outer, inner = _outer(front, x), _inner(front, front.values, x)
     known = np.isfinite(outer)
     if np.any(known):
         axes.fill_between(x[known], outer[known], np.maximum(inner, outer)[known], color=SHADE, linewidth=0,
                           label="certified band", zorder=1)  # fmt: skip
         axes.plot(x[known], outer[known], color=GREY, linewidth=0.9, linestyle=(0, (6, 3)),
                   label="no move is below", zorder=1.5)  # fmt: skip
-    axes.plot(*front.values.T, color=COLOURS[0], linewidth=1.2, zorder=2)
+    axes.plot(x, inner, color=COLOURS[0], linewidth=1.2, zorder=2)
     axes.set_xlim(low[0] - room[0], high[0] + room[0])
     axes.set_ylim(low[1] - room[1], high[1] + room[1])
+
+
+def _strip(front: Front, axes: Axes) -> None:
+    """How much better than what is achieved a move could be, in every objective, per cent of the ranges."""
+    beyond, points = outside(front.planes, front.corners, front.ideal, front.nadir), front.normalised
+    x = np.unique(np.concatenate([points[:, 0], np.linspace(0.0, 1.0, _SAMPLES)]))
+    achieved = zip(x, _inner(front, points, x), strict=True)
+    depth = [100 * max(beyond.depth(np.array(place)), 0.0) for place in achieved]
+    low, high = front.ideal[0], front.nadir[0]
+    axes.fill_between(low + (high - low) * x, depth, color=SHADE, edgecolor=GREY, linewidth=0.7)
+    axes.set_ylim(0.0, 1.25 * 100 * max(front.error or 0.0, 1e-6))
+    if front.asked is not None:
+        axes.axhline(100 * front.asked, color=GREY, linewidth=0.9, linestyle=(0, (6, 3)))
+    axes.set_ylabel("gap at most\n[%]", fontsize=8)
+    axes.tick_params(labelsize=8, color=GREY)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+
+
+def _inner(front: Front, points: Floats, x: Floats) -> Floats:
+    """What is achieved at ``x``: between neighbours by mixing them or, where that means nothing, by the one before."""
+    if front.convex or front.blends:
+        return np.interp(x, *points.T)
+    held: Floats = points[np.maximum(np.searchsorted(points[:, 0], x, side="right") - 1, 0), 1]
+    return held
 
 
 def _outer(front: Front, x: Floats) -> Floats:
@@ -117,6 +156,7 @@ def _second_axes(front: Front, axes: Axes) -> None:
         side.tick_params(labelsize=8, color=GREY)
         side.spines[:].set_color(GREY)
         (side.set_xlabel if side is sides[0] else side.set_ylabel)(f"{name} / least", fontsize=8, color=GREY)
+    sides[0].xaxis.label.set_horizontalalignment("left")  # clear of the line under the title
 
 
 def _by(size: float) -> Any:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trajopt.fronts.geometry import Outside
 from trajopt.fronts.objectives import friendly, unit
 from trajopt.fronts.scalarise import Plane
 from trajopt.mesh import Floats
@@ -173,6 +174,21 @@ class Front:
     def __repr__(self) -> str:
         known = "" if self.error is None else f", known within {100 * self.error:.2g} %"
         return f"<Front {self.status.value}: {len(self.points)} points of {' and '.join(self.names)}{known}>"
+
+
+def outside(
+    planes: Sequence[Plane],
+    corners: Sequence[tuple[float, ...]],
+    ideal: Sequence[float] | Floats,
+    nadir: Sequence[float] | Floats,
+) -> Outside:
+    """What bounds a front from outside, normalised."""
+    low, size = np.array(ideal), ranges(ideal, nadir)
+    weights = np.array([plane.weights for plane in planes]).reshape(-1, len(low)) * size
+    values = np.array([plane.value for plane in planes]) - weights @ (low / size)
+    total = np.sum(weights, axis=1)
+    far = (np.array(corners).reshape(-1, len(low)) - low) / size
+    return Outside(weights / total[:, None], values / total, far)
 
 
 def ranges(ideal: Sequence[float] | Floats, nadir: Sequence[float] | Floats) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 
 from trajopt.fronts import geometry
 from trajopt.fronts.blends import blends
-from trajopt.fronts.front import Front, Point, ranges
+from trajopt.fronts.front import Front, Point, outside, ranges
 from trajopt.fronts.geometry import Gap, Outside
 from trajopt.fronts.scalarise import Answer, Task, answer, is_convex
 from trajopt.mesh import Floats
@@ -147,30 +147,24 @@ class Search:
         return sorted(zip(found, kept, strict=True), key=lambda pair: pair[0].values)
 
     def _outside(self) -> Outside:
-        ideal, nadir = self._ends
-        size, count = ranges(ideal, nadir), len(self.terms)
         planes = [plane for x in self.answers for plane in x.planes]
-        weights = np.array([plane.weights for plane in planes]).reshape(-1, count) * size
-        values = np.array([plane.value for plane in planes]) - weights @ (ideal / size)
-        total = np.sum(weights, axis=1)
-        corners = np.array([corner for x in self.answers for corner in x.corners]).reshape(-1, count)
-        return Outside(weights / total[:, None], values / total, (corners - ideal) / size)
+        return outside(planes, [corner for x in self.answers for corner in x.corners], *self._ends)
 
     def gaps(self) -> list[Gap]:
         """Where the front is known least, the widest gap first; none while an anchor or its bound is missing."""
         anchors = [x for x in self.answers if x.task.kind == "anchor"]
         if len(anchors) < len(self.terms) or not all(x.values is not None and x.planes for x in anchors):
             return []
-        points, outside = self._points(), self._outside()
+        points, beyond = self._points(), self._outside()
         ideal, nadir = self._ends
         y = (np.array([point.values for point in points]) - ideal) / ranges(ideal, nadir)
         if self.convex:
-            return geometry.hull_gaps(y, outside)
+            return geometry.hull_gaps(y, beyond)
         if len(self.terms) > 2:
-            return geometry.point_gaps(y, outside)
+            return geometry.point_gaps(y, beyond)
         pairs = zip(points, points[1:], strict=False)
         between = [(self._between(p, q) - ideal) / ranges(ideal, nadir) for p, q in pairs]
-        return geometry.staircase_gaps(y, between, outside)
+        return geometry.staircase_gaps(y, between, beyond)
 
     def _between(self, first: Point, second: Point) -> Floats:
         key = id(first.solution), id(second.solution)
