@@ -22,6 +22,7 @@ from trajopt.fronts import geometry
 from trajopt.fronts.blends import blend
 from trajopt.fronts.geometry import Outside
 from trajopt.fronts.output import FORMAT
+from trajopt.fronts.scalarise import Answer, Plane
 from trajopt.fronts.tracing import prepare
 from trajopt.plot_front import plot_front
 from trajopt.workers import Here
@@ -185,6 +186,32 @@ def test_bounds_that_are_missing_are_not_made_up() -> None:
     front = trajopt.pareto(problem, "energy,peak_power", error=0.3)
     assert front.status is trajopt.Verdict.UNDECIDED and front.error is None
     assert "no lower bound" in front.message and len(front.points) == 2
+
+
+class Sphere(Here):
+    """Answers every weighted sum over the ball around (1, …, 1), whose front is an eighth of a sphere."""
+
+    def __init__(self) -> None:
+        self.still = solved(QUICK)
+
+    def run(self, work: Any, jobs: Any) -> Any:
+        for k, task in enumerate(jobs):
+            size = len(task.terms)
+            weights = np.array(task.weights) if task.weights else np.eye(size)[task.minimized]
+            length = float(np.linalg.norm(weights))
+            plane = Plane(tuple(weights), float(np.sum(weights)) - length)
+            yield k, Answer(task, self.still, tuple(1 - weights / length), (plane,), weights=tuple(weights))
+
+
+@pytest.mark.parametrize(("size", "error", "most"), [(2, 0.005, 17), (3, 0.05, 40)])
+def test_the_search_on_a_sphere_certifies_no_less_than_its_error(size: int, error: float, most: int) -> None:
+    names = ["peak_velocity", "jerk_l2", "peak_acceleration"][:size]
+    front = prepare(QUICK, names, error=error)(Sphere(), lambda *_: None).run()
+    assert front.status is trajopt.Verdict.SOLVED and front.solves <= most and front.error <= error
+    rays = np.abs(np.random.default_rng(1).normal(size=(300, size)))
+    best = 1 - rays / np.linalg.norm(rays, axis=1)[:, None]  # on the true front
+    behind = [geometry.below_hull(front.values, place).error for place in best]
+    assert max(behind) <= front.error + 1e-9 and max(behind) > front.error / 20
 
 
 class TestGeometry:

@@ -51,7 +51,7 @@ class Gap:
 
 def hull_gaps(points: Floats, outside: Outside) -> list[Gap]:
     """The gaps between the hull of ``points`` (n, m) and the outside, the widest first: one at each of its vertices."""
-    gaps = [_below_hull(points, vertex) for vertex in _vertices(outside)]
+    gaps = [below_hull(points, vertex) for vertex in _vertices(outside)]
     return sorted(gaps, key=lambda gap: -gap.error)
 
 
@@ -64,7 +64,7 @@ def _vertices(outside: Outside) -> Floats:
     return meeting[np.all(np.isfinite(meeting), axis=1)]
 
 
-def _below_hull(points: Floats, vertex: Floats) -> Gap:
+def below_hull(points: Floats, vertex: Floats) -> Gap:
     """How far a vertex lies below the hull, along (1, …, 1), and the normal of the hull above it."""
     count, size = points.shape
     rows = np.hstack([points.T, -np.ones((size, 1))])
@@ -101,7 +101,7 @@ def point_gaps(points: Floats, outside: Outside) -> list[Gap]:
     for corner in upper_bounds(points):
         depth = outside.depth(corner)
         inner = np.minimum(corner, _FAR) - max(depth, 0.0)
-        gaps.append(Gap(depth, _below_hull(points, inner).weights))
+        gaps.append(Gap(depth, below_hull(points, inner).weights))
     return sorted(gaps, key=lambda gap: -gap.error)
 
 
