@@ -125,20 +125,24 @@ def test_no_weighted_sum_is_better_than_a_convex_front_says() -> None:
         assert all(np.dot(plane.weights, front.values.T).min() >= plane.value * (1 - 1e-9) for plane in front.planes)
 
 
-def test_three_objectives() -> None:
+def test_three_objectives(tmp_path: Path) -> None:
     front = trajopt.pareto(QUICK, "peak_velocity,rms_jerk,peak_acceleration", error=0.1)
     assert front.status is trajopt.Verdict.SOLVED and front.values.shape[1] == 3 and front.error <= 0.1  # type: ignore[operator]
     assert len(set(front.anchors)) == 3
+    front.save(tmp_path)
+    assert (report := trajopt.check_file(tmp_path / "front.json")).passed, report.summary()
     assert plot_front(front).figure.axes[0].get_xlabel().startswith("peak velocity")
 
 
-def test_time_against_energy_never_rises() -> None:
+def test_time_against_energy_never_rises(tmp_path: Path) -> None:
     front = trajopt.pareto(SMALL, "time,energy", points=5)
     assert front.status is trajopt.Verdict.SOLVED and len(front.points) == 5 and front.error is not None
     assert np.all(np.diff(front.values[:, 0]) > 0) and np.all(np.diff(front.values[:, 1]) < 0)
     least = solved(SMALL.replace(move=SMALL.move.model_copy(update={"time": "free"}),
                                  objective=trajopt.Objective(terms=(term("time"),))))  # fmt: skip
     assert front.values[0, 0] == pytest.approx(least.duration, rel=1e-9) and front.values[-1, 0] == 1.0
+    front.save(tmp_path)
+    assert (report := trajopt.check_file(tmp_path / "front.json")).passed, report.summary()
     exact = 10 * np.square(front.points[2].solution.metrics["peak_velocity"])
     assert front.values[2, 1] == pytest.approx(exact, rel=1e-3)
 
@@ -347,7 +351,7 @@ def test_an_interrupt_keeps_what_is_finished(move: Path, tmp_path: Path) -> None
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    time.sleep(5)
+    time.sleep(4)
     child.send_signal(signal.SIGINT)
     _, error = child.communicate(timeout=30)
     assert child.returncode == 130 and error.strip() == "trajopt: stopped by the user"

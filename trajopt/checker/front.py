@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from scipy.optimize import linprog
 
 from trajopt.checker.case import EPS, TOTALS, VALUE, Array, Case
 from trajopt.checker.checking import check_file
@@ -28,7 +27,8 @@ _KEYS: Final = ("objectives", "points", "planes", "corners", "ideal", "nadir", "
 _BELOW: Final = 1e-6  # relative: a point may lie below a bound by rounding
 _ERROR: Final = 1e-6  # of the ranges, between the stated error and ours
 _FAR: Final = 1e9
-_MANY: Final = 40  # points of three objectives that are not convex: more corners than can be looked at
+_COUNTED: Final = 4.0  # ranges: moves that are worse than that in an objective do not count
+_MANY: Final = 60  # points of three objectives: with more, there are more corners than can be looked at
 _NONCONVEX: Final = ("force", "power", "current", "voltage")
 
 
@@ -104,7 +104,7 @@ def _points(
         cases.append(case)
         own.append(({(name, norm): weight for name, norm, weight in case.terms}, case.lower_bound))
     timed = any(objective["minimize"] == "time" for objective in stated["objectives"])
-    problems = {(case.scheme, case.order, case.count, timed or case.end_time) for case in cases}
+    problems = {(case.scheme, case.order, *(() if timed else (case.count, case.end_time))) for case in cases}
     checks.append(question("one mesh", "" if len(problems) <= 1 else "the points are moves on different meshes"))
     return checks, cases, own
 
@@ -187,7 +187,11 @@ def _error(front: _Front, convex: bool, blends: int) -> float | None:
     """The most by which any move may be better than all that was achieved, in every objective, normalised."""
     points = (front.values - front.low) / front.size
     if convex:
-        return max(_below_hull(points, vertex) for vertex in _vertices(front))
+        if points.shape[1] > 2 and len(points) > _MANY:
+            return None
+        normals = _normals(points)
+        below = np.min(points @ normals.T, axis=0) - _vertices(front) @ normals.T  # the most is the distance
+        return float(np.max(below, initial=0.0))
     if points.shape[1] == 2:
         moves = np.vstack([front.values, *_blended(front, blends)])
         return float(np.max(front.depth(_stairs((moves - front.low) / front.size)), initial=0.0))
@@ -211,10 +215,12 @@ def _stairs(points: Array) -> Array:
 
 
 def _vertices(front: _Front) -> Array:
-    """Every place where as many half-planes meet as there are objectives, and that is above all of them."""
+    """Every place where as many half-planes meet as there are objectives, and that is above all of them; no farther
+    than _COUNTED ranges above the best."""
     count = front.weights.shape[1]
     rows = front.weights * front.size
     rows, least = rows / rows.sum(axis=1)[:, None], (front.least - front.weights @ front.low) / rows.sum(axis=1)
+    rows, least = np.vstack([rows, -np.eye(count)]), np.append(least, np.full(count, -_COUNTED))
     found = []
     for chosen in combinations(range(len(rows)), count):
         system = rows[list(chosen)]
@@ -225,15 +231,25 @@ def _vertices(front: _Front) -> Array:
     return kept
 
 
-def _below_hull(points: Array, vertex: Array) -> float:
-    """The largest distance by which a half-plane parts a vertex from all points: by duality that from their hull."""
-    count, size = points.shape
-    rows = np.hstack([-points, np.ones((count, 1))])
-    cost = np.append(vertex, -1.0)
-    sums = np.append(np.ones(size), 0.0)[None, :]
-    bounds = [(0.0, None)] * size + [(None, None)]
-    found = linprog(cost, A_ub=rows, b_ub=np.zeros(count), A_eq=sums, b_eq=[1.0], bounds=bounds)
-    return float("inf") if found.x is None else max(-float(cost @ found.x), 0.0)
+def _normals(points: Array) -> Array:
+    """(w, m) every direction, of sum one, in which a half-plane can rest on the hull of the points: on as many of them
+    as it has weights that are not zero."""
+    count = points.shape[1]
+    found = [np.eye(count)]
+    for size in range(2, count + 1):
+        for axes in combinations(range(count), size):
+            chosen = np.array(list(combinations(range(len(points)), size)), dtype=int).reshape(-1, size)
+            systems = np.ones((len(chosen), size + 1, size + 1))
+            systems[:, :size, :size] = points[:, axes][chosen]
+            systems[:, size, size] = 0.0
+            systems = systems[np.abs(np.linalg.det(systems)) > 1e-14]
+            right = np.zeros((len(systems), size + 1, 1))
+            right[:, size] = 1.0
+            weights = np.linalg.solve(systems, right)[:, :size, 0]
+            normals = np.zeros((len(weights), count))
+            normals[:, axes] = weights
+            found.append(normals[np.all(weights >= 0, axis=1)])
+    return np.vstack(found)
 
 
 def _blended(front: _Front, count: int) -> list[Array]:

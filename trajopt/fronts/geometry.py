@@ -18,7 +18,8 @@ from scipy.spatial import HalfspaceIntersection
 
 from trajopt.mesh import Floats
 
-_FAR: Final = 2.0  # beyond every anchor
+COUNTED: Final = 4.0  # ranges: where all is convex, a move that is worse than that in an objective does not count
+_FAR: Final = 2.0  # beyond every anchor, within what counts
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,10 @@ def hull_gaps(points: Floats, outside: Outside) -> list[Gap]:
 
 
 def _vertices(outside: Outside) -> Floats:
-    """Where the half-planes meet, (v, m)."""
+    """Where the half-planes meet, (v, m), among each other and with the end of what counts."""
     count = outside.weights.shape[1]
     above = np.hstack([-outside.weights, outside.values[:, None]])
-    below = np.hstack([np.eye(count), np.full((count, 1), -2 * _FAR)])
+    below = np.hstack([np.eye(count), np.full((count, 1), -COUNTED)])
     meeting: Floats = HalfspaceIntersection(np.vstack([above, below]), np.full(count, _FAR)).intersections
     return meeting[np.all(np.isfinite(meeting), axis=1)]
 
