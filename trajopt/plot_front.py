@@ -82,7 +82,8 @@ def _pair(front: Front, axes: Axes, i: int, j: int) -> None:
         knee = values[front.knee]
         axes.plot(knee[i], knee[j], "D", color=COLOURS[1], markersize=8, markerfacecolor="none", label="knee", zorder=4)
         text = ", ".join(f"{knee[k]:.4g} {front.units[k]}" for k in (i, j))
-        axes.annotate(text, (knee[i], knee[j]), (9, 7), textcoords="offset points", fontsize=8, color=GREY)
+        if len(front.terms) == 2:  # else it would lie among points
+            axes.annotate(text, (knee[i], knee[j]), (9, 7), textcoords="offset points", fontsize=8, color=GREY)
     for k, label in ((i, axes.set_xlabel), (j, axes.set_ylabel)):
         unit = "" if front.units[k] == "1" else f" [{front.units[k]}]"
         label(f"{front.names[k]}{unit}", fontsize=9)
