@@ -1,4 +1,4 @@
-"""Tables II and III and Figures 1 to 6 of Clemen & Rupp 2023: ``python -m problems.clemen_rupp --output demo``.
+"""Tables II and III and Figures 1 to 7 of Clemen & Rupp 2023: ``python -m problems.clemen_rupp --output demo``.
 
 Every case is solved with the paper's Euler scheme, which reproduces the printed digits, and with the exact scheme,
 which shows what is left of them when nothing is integrated approximately.
@@ -7,11 +7,12 @@ which shows what is left of them when nothing is integrated approximately.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import pandas as pd
 from rich.console import Console
@@ -20,6 +21,7 @@ from rich.table import Table
 
 import trajopt
 from trajopt.errors import TrajoptError
+from trajopt.fronts import Front
 from trajopt.solution import Solution
 
 
@@ -130,6 +132,14 @@ def figures(solutions: Mapping[Case, Solution], directory: Path) -> list[Path]:
     return paths
 
 
+def pareto_sweep(points: int = 51, workers: int = 1) -> Front:
+    """The front of Fig. 7: evenly spaced weights (eq. 26), by the Euler scheme as in the paper."""
+    problem = trajopt.load("clemen_rupp_energy", ['transcription.scheme="euler"'])
+    problem = problem.replace(title="Fig. 7: total energy against peak power (Euler scheme)")
+    front: Front = trajopt.pareto(problem, "energy,peak_power", points=points, workers=workers)
+    return front
+
+
 def print_tables(table: pd.DataFrame, console: Console) -> None:
     """Tables II and III: the printed digits beside ours, and what the marks mean."""
     for title, quantity in (
@@ -177,6 +187,17 @@ def _words(table: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def _draw_front(front: Front, directory: Path) -> list[Path]:
+    """Fig. 7 as a picture and a table. Raises OSError."""
+    if not front.points:
+        return []
+    paths = [directory / "fig7_pareto_front.png", directory / "fig7_pareto_front.csv"]
+    figure: Any = front.plot().figure
+    figure.savefig(paths[0], dpi=150)
+    front.frame.to_csv(paths[1], index=False)
+    return paths
+
+
 def _with_units(column: str) -> str:
     unit = {"energy": "J", "power": "W"}.get(column.partition("_")[0], "")
     return f"{column} [{unit}]" if unit and column.endswith(SCHEMES) else column
@@ -192,18 +213,23 @@ def main(arguments: list[str] | None = None) -> int:
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("solving", total=len(CASES))
         solutions = solve_cases(done=lambda case: progress.update(task, advance=1, description=" ".join(case)))
+        progress.update(progress.add_task("Fig. 7", total=None))
+        front = pareto_sweep(workers=os.cpu_count() or 1)
     table = study(solutions)
     print_tables(table, console)
     csv = output / "tables_2_and_3.csv"
     table.rename(columns=_with_units).to_csv(csv)
-    for path in (csv, *figures(solutions, output)):
+    drawn = [*figures(solutions, output), *_draw_front(front, output)]
+    for path in (csv, *drawn):
         console.print(f"wrote {path}")
     unsolved = {case: solution for case, solution in solutions.items() if not solution.status.solved}
     for case, solution in unsolved.items():
         console.print(f"not solved: {' '.join(case)}: {solution.status.value}, {solution.message}")
     for fault in disagreements(table):
         console.print(f"not as published: {fault}")
-    return 3 if unsolved or disagreements(table) else 0
+    if not front.status.solved:
+        console.print(f"not solved: Fig. 7: {front.message}")
+    return 3 if unsolved or disagreements(table) or not front.status.solved else 0
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import pytest
 import problems
 import trajopt
 from problems import clemen_rupp
-from tests.conftest import solved
+from tests.conftest import PUBLISHED_CURVES, solved
 
 PAPER = [name for name in problems.ready_made() if name.startswith("clemen_rupp_")]
 QUANTITIES, NORMS = ("velocity", "acceleration", "jerk", "power"), ("l1", "l2", "linf")
@@ -186,10 +186,29 @@ def test_morals_in_numbers(solutions: dict[clemen_rupp.Case, trajopt.Solution]) 
         assert solutions[name, "exact"].metrics["peak_velocity"] == pytest.approx(0.5, rel=1e-6)
 
 
+@pytest.fixture(scope="module")
+def front() -> trajopt.Front:
+    """Every tenth weight of Fig. 7; the demonstration draws all 51."""
+    return clemen_rupp.pareto_sweep(points=6)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not PUBLISHED_CURVES.exists(), reason="published curves are not part of the repository")
+def test_the_front_of_figure_7(front: trajopt.Front) -> None:
+    published = pd.read_csv(PUBLISHED_CURVES / "fig7_pareto_front.csv").to_numpy()
+    ratios = front.values / front.values.min(axis=0)
+    assert front.status is trajopt.Verdict.SOLVED and len(front.points) == 6
+    assert np.max(np.abs(ratios / published[::-1][::10] - 1)) <= 1e-3
+
+
 def run(
-    monkeypatch: pytest.MonkeyPatch, given: dict[clemen_rupp.Case, trajopt.Solution], output: Path
+    monkeypatch: pytest.MonkeyPatch,
+    given: dict[clemen_rupp.Case, trajopt.Solution],
+    front: trajopt.Front,
+    output: Path,
 ) -> tuple[int, str]:
     monkeypatch.setattr(clemen_rupp, "solve_cases", lambda done: given)
+    monkeypatch.setattr(clemen_rupp, "pareto_sweep", lambda workers: front)
     text = io.StringIO()
     with contextlib.redirect_stdout(text):
         code = clemen_rupp.main(["--output", str(output)])
@@ -198,9 +217,12 @@ def run(
 
 @pytest.mark.slow
 def test_the_study_writes_figures_and_table(
-    solutions: dict[clemen_rupp.Case, trajopt.Solution], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    solutions: dict[clemen_rupp.Case, trajopt.Solution],
+    front: trajopt.Front,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
-    code, text = run(monkeypatch, solutions, tmp_path / "demo")
+    code, text = run(monkeypatch, solutions, front, tmp_path / "demo")
     assert code == 0
     written = {path.name: path for path in (tmp_path / "demo").iterdir()}
     figures = {
@@ -210,8 +232,9 @@ def test_the_study_writes_figures_and_table(
         "fig4_power.png",
         "fig5_time.png",
         "fig6_equal_weights.png",
+        "fig7_pareto_front.png",
     }
-    assert set(written) == {"tables_2_and_3.csv"} | figures
+    assert set(written) == {"tables_2_and_3.csv", "fig7_pareto_front.csv"} | figures
     assert all(f"wrote {path}" in text for path in written.values())
     assert all(written[name].stat().st_size > 30_000 for name in figures)
     assert len(pd.read_csv(written["tables_2_and_3.csv"])) == 15
@@ -220,15 +243,18 @@ def test_the_study_writes_figures_and_table(
 
 @pytest.mark.slow
 def test_the_study_fails_when_an_entry_differs_or_a_case_is_unsolved(
-    solutions: dict[clemen_rupp.Case, trajopt.Solution], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    solutions: dict[clemen_rupp.Case, trajopt.Solution],
+    front: trajopt.Front,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     monkeypatch.setattr(clemen_rupp, "figures", lambda solutions, directory: [])
     wrong = dict(solutions)
     good = solutions["jerk_l2", "euler"]
     wrong["jerk_l2", "euler"] = replace(good, metrics={**good.metrics, "energy": 1.01 * good.metrics["energy"]})
-    code, text = run(monkeypatch, wrong, tmp_path)
+    code, text = run(monkeypatch, wrong, front, tmp_path)
     assert code == 3 and "not as published: jerk L2: energy 2.8243, printed 2.80" in text
     lost = dict(solutions)
     lost["power_l2", "exact"] = trajopt.Solution(trajopt.Verdict.LIMIT, good.problem, good.route, message="time limit")
-    code, text = run(monkeypatch, lost, tmp_path)
+    code, text = run(monkeypatch, lost, front, tmp_path)
     assert code == 3 and "not solved: power_l2 exact: LIMIT, time limit" in text

@@ -18,6 +18,7 @@ _HOMES = {
     "solve": "trajopt.worker",
     "route": "trajopt.routing",
     "synchronise": "trajopt.axes",
+    **dict.fromkeys(("pareto", "Front"), "trajopt.fronts"),
     "check": "trajopt.checker",
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",
@@ -25,9 +26,12 @@ _HOMES = {
     "compare": "trajopt.plot",
     "Verdict": "trajopt.verdict",
     **dict.fromkeys(
-        ("Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Transcription"),
+        (
+            "Problem", "Move", "State", "Via", "Limits", "Load", "Vibration", "Objective", "Term", "Ceiling",
+            "Transcription",
+        ),
         "trajopt.problem",
-    ),
+    ),  # fmt: skip
     **dict.fromkeys(("PlantProblem", "PlantSection", "Robust"), "trajopt.plant.problem"),
     "PlantSolution": "trajopt.plant.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),

@@ -1,4 +1,4 @@
-"""The command line: ``trajopt solve | study | synchronise | check | export | plot | route | problems``."""
+"""The command line: ``trajopt solve | study | pareto | synchronise | check | export | plot | route | problems``."""
 
 from __future__ import annotations
 
@@ -120,6 +120,40 @@ def study(
 
 
 @app.command()
+def pareto(
+    source: Source,
+    objectives: Annotated[
+        str, typer.Option("--objectives", metavar="A,B[,C]", help="such as energy,peak_power or time,energy")
+    ],
+    points: Annotated[int | None, typer.Option("--points", help="so many points, evenly placed")] = None,
+    error: Annotated[
+        str | None, typer.Option("--error", metavar="SHARE", help="refine until known within, such as 0.5% (default)")
+    ] = None,
+    method: Annotated[str, typer.Option("--method", help="weights (eq. 26) or epsilon (ceilings)")] = "weights",
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the front into this folder")] = None,
+    workers: Annotated[int, typer.Option("--workers", help="processes that solve at once")] = 1,
+    overrides: Overrides = [],  # noqa: B006 (typer reads the default)
+    as_json: AsJson = False,
+) -> None:
+    """Trace the Pareto front between two or three objectives; exits 0 only when it is solved and known as asked."""
+    from trajopt import problem_file
+    from trajopt.fronts import command
+
+    problem = problem_file.load(source, overrides)
+    asked = {"points": points, "error": command.read_error(error), "method": method}
+    search = command.ready(problem, objectives, workers, asked)
+    _make_folder(output)
+    front = command.run(search, workers, output)
+    if as_json:
+        print(json.dumps(front.sealed(), allow_nan=False))
+    else:
+        command.print_front(front)
+        if output is not None:
+            print(f"wrote {output}")
+    raise typer.Exit(front.status.exit_code)
+
+
+@app.command()
 def route(source: Source, overrides: Overrides = [], as_json: AsJson = False) -> None:  # noqa: B006
     """Say which model and solver would take a problem, and why, without solving it."""
     from trajopt import problem_file, routing
@@ -130,7 +164,7 @@ def route(source: Source, overrides: Overrides = [], as_json: AsJson = False) ->
 
 @app.command()
 def check(
-    result: Annotated[Path, typer.Argument(help="a result.json")],
+    result: Annotated[Path, typer.Argument(help="a result.json, or a front.json")],
     problem: Annotated[str | None, typer.Option("--problem", help="the problem it must belong to")] = None,
     strict: Annotated[bool, typer.Option("--strict", help="limits to 1e-9, in rational arithmetic")] = False,
     as_json: AsJson = False,

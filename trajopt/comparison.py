@@ -135,6 +135,7 @@ def _comparable(problem: Problem) -> bool:
     paid = all(term.minimize not in (*DERIVATIVES, "time") for term in problem.objective.terms)
     fixed = move.fixed_time is not None and isinstance(move.end.position, float) and move.start_position is not None
     exact = problem.transcription.scheme == "exact"
+    paid = paid and not problem.objective.ceilings
     return at_rest and paid and fixed and exact and not move.via and _stroke(problem) > 0
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from trajopt import checker, friction
-from trajopt.attempt import Attempt, Clock
+from trajopt.attempt import Attempt, Clock, convex, smoothest, to
 from trajopt.errors import InternalError
 from trajopt.explain import explain
 from trajopt.metrics import metrics
@@ -88,7 +88,7 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
         move = problem.move.model_copy(update={"time": longest})
         longest_move = replace(setting, problem=problem.model_copy(update={"move": move}))
         tried = without(longest_move, nonaffine_limits(problem))
-        explanation = explain(tried, clock)
+        explanation = _by_ceilings(longest_move, longest, clock) or explain(tried, clock)
         if explanation["continuous"]:
             status = Verdict.IMPOSSIBLE
         elif not friction.is_settled(tried, clock):
@@ -102,6 +102,19 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
     if status is Verdict.UNDECIDED and problem.load.coulomb:
         message += "; the program takes friction at rest for friction in motion"
     return Solution(status, problem, chosen, explanation=explanation, timings=clock.timings(), message=message)
+
+
+def _by_ceilings(setting: Setting, duration: float, clock: Clock) -> dict[str, Any]:
+    """Where the move is possible without the ceilings of the objective, that they are why it is not; else nothing."""
+    problem = setting.problem
+    if not problem.objective.ceilings:
+        return {}
+    kinematic = without(setting, nonaffine_limits(problem))
+    if convex(kinematic, duration, to(smoothest(problem)), clock).trajectory is None:
+        return {}
+    held = " and ".join(f"{problem.shown(c.term.label)} at most {c.at_most:g}" for c in problem.objective.ceilings)
+    text = f"no move on this mesh keeps {held} (SI); within the limits alone it is possible: raise the ceiling"
+    return {"continuous": False, "text": [text]}
 
 
 def _certificate(setting: Setting, value: float, attempt: Attempt) -> dict[str, Any]:

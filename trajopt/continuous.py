@@ -34,7 +34,7 @@ def findings(
 
     Raises InternalError when an answer is better than an optimum in continuous time that is proven.
     """
-    if len(problem.objective.terms) != 1 or not _one_way_rest_to_rest(problem):
+    if len(problem.objective.all_terms) != 1 or not _one_way_rest_to_rest(problem):
         return {}, _on_mesh(trajectory)
     try:
         if _motor_alone(problem):

@@ -10,7 +10,7 @@ import numpy as np
 import norms
 from trajopt.mesh import Floats
 from trajopt.motor import Intake
-from trajopt.problem import WITHOUT_NORM, Load, Objective, Term
+from trajopt.problem import WITHOUT_NORM, Ceiling, Load, Objective, Term
 from trajopt.transcribe import Transcript
 
 _POWERS: Final = {"energy": "power", "copper_loss": "heat", "electrical_energy": "electrical_power"}
@@ -42,8 +42,10 @@ class Lowered:
 
 
 def lower(transcript: Transcript, objective: Objective) -> Lowered:
-    """The objective as a scalar expression; its rows go to the transcript's model."""
+    """The objective as a scalar expression; its rows, and those of its ceilings, go to the transcript's model."""
     model = transcript.model
+    for ceiling in objective.ceilings or ():
+        _hold(transcript, ceiling)
     measured = [_Measured.of(transcript, term) for term in objective.terms]
     if len(measured) == 1 and (norm := measured[0].norm) is not None:
         only = measured[0]
@@ -55,6 +57,14 @@ def lower(transcript: Transcript, objective: Objective) -> Lowered:
         value = m.duration if m.norm is None else m.norm.lower(model, m.samples * (1 / m.size), m.weights, m.duration)
         total = total + value * (m.weight * (m.size if m.norm is not None else 1.0) / scale)
     return Lowered(total, scale, None)
+
+
+def _hold(transcript: Transcript, ceiling: Ceiling) -> None:
+    """A term below its ceiling, by the rows of its norm; priced as ``energy.at_most``."""
+    m, most = _Measured.of(transcript, ceiling.term), ceiling.at_most
+    assert m.norm is not None
+    value = m.norm.lower(transcript.model, m.samples * (1 / m.size), m.weights, m.duration) * m.size
+    transcript.model.nonpositive(value - most, most, f"{ceiling.term.label}.at_most", np.array([0.5]), np.array([most]))
 
 
 def measure(transcript: Transcript, objective: Objective) -> float:

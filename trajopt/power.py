@@ -23,7 +23,7 @@ from trajopt.attempt import Attempt, Clock, convex, to
 from trajopt.mesh import Floats
 from trajopt.model import Claim, Outcome
 from trajopt.motor import implied
-from trajopt.problem import Load, Problem
+from trajopt.problem import Load, Objective, Problem
 from trajopt.quantities import Quantities
 from trajopt.rebuild import rebuild
 from trajopt.signals import OnFloats, Signal
@@ -45,17 +45,20 @@ def descend(setting: Setting, start: Trajectory, clock: Clock) -> Attempt:
     """From a feasible move to a local optimum by programs with linearised power; the attempt's prices are those of the
     last one. The outcome claims FAILED where the descent does not settle."""
     objective, duration = setting.problem.objective, start.duration
-    here, value = start, start.measure(objective)
+    here, penalty = start, 0.0
     attempt = Attempt(Outcome(Claim.FAILED, "no step"))
     for step in range(_STEPS):
         attempt = convex(replace(setting, quantities=_linearised_at(here)), duration, to(objective), clock)
         if attempt.trajectory is None:
             return attempt
-        there, best = _search_line(setting, here, attempt.trajectory, value)
+        penalty = max(penalty, _penalty(attempt))
+        value = _cost(objective, here, penalty)
+        there, best = _search_line(setting, here, attempt.trajectory, value, penalty)
         settled = value - best <= _ENOUGH * abs(best)
         if best <= value:
-            here, value = there, best
+            here = there
         if settled:
+            value = here.measure(objective)
             return replace(attempt, trajectory=here, value=value, bound=-np.inf, notes={"programs": step + 1})
     return Attempt(Outcome(Claim.FAILED, f"the descent did not settle in {_STEPS} programs"))
 
@@ -65,16 +68,31 @@ def linearised(setting: Setting, trajectory: Trajectory) -> Setting:
     return replace(setting, quantities=_linearised_at(trajectory))
 
 
-def _search_line(setting: Setting, here: Trajectory, there: Trajectory, value: float) -> tuple[Trajectory, float]:
-    """The best of some points on the way from ``here`` to ``there``, by the true objective."""
+def _cost(objective: Objective, trajectory: Trajectory, penalty: float) -> float:
+    """The true objective and, by an exact penalty per part of a ceiling, what exceeds ceilings: only a linearised power
+    keeps them on the way."""
+    shares = [trajectory.measure(Objective(terms=(c.term,))) / c.at_most for c in objective.ceilings or ()]
+    return trajectory.measure(objective) + penalty * sum(max(share - 1, 0.0) for share in shares)
+
+
+def _penalty(attempt: Attempt) -> float:
+    """Twice the largest price of a ceiling, SI objective per part of it: enough for the penalty to be exact."""
+    rows = [rows for name, rows in attempt.outcome.prices.items() if name.endswith(".at_most")]
+    return 2 * max((float(np.abs(r.per_unit @ r.own)) * attempt.slope for r in rows), default=0.0)
+
+
+def _search_line(
+    setting: Setting, here: Trajectory, there: Trajectory, value: float, penalty: float
+) -> tuple[Trajectory, float]:
+    """The best of some points on the way from ``here`` to ``there``, by `_cost`."""
     objective = setting.problem.objective
-    best, found = there, there.measure(objective)
+    best, found = there, _cost(objective, there, penalty)
     share = 0.5
     while found > value and share > 1e-4:
         top = here.chain[-1] + share * (there.chain[-1] - here.chain[-1])
         start = np.array([x[0] for x in here.chain[:-1]])
         best = rebuild(setting.problem, setting.mesh, setting.scheme, setting.sizes, here.duration, start, top)
-        found, share = best.measure(objective), share / 2
+        found, share = _cost(objective, best, penalty), share / 2
     return best, found
 
 

@@ -116,7 +116,7 @@ def _stays(problem: Problem) -> bool:
 
 def _load(problem: Problem) -> None:
     load = problem.load
-    named = {f"objective {term.minimize}": term.minimize for term in problem.objective.terms}
+    named = {f"objective {term.minimize}": term.minimize for term in problem.objective.all_terms}
     named |= {f"limits.{name}": name for name in problem.limits.given()}
     needs = [where for where, name in named.items() if name in (*LOADED, *ELECTRICAL)]
     if needs and load.inertia is None:

@@ -51,8 +51,8 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
     found: dict[str, tuple[float, float]] = {}
     for key, rows in attempt.outcome.prices.items():
         quantity, _, side = key.partition(".")
-        symmetric = problem.limits.given()[quantity].symmetric
-        name, outwards = (quantity, 1.0) if symmetric else (key, 1.0 if side == "max" else -1.0)
+        symmetric = side != "at_most" and problem.limits.given()[quantity].symmetric
+        name, outwards = (quantity, 1.0) if symmetric else (key, -1.0 if side == "min" else 1.0)
         unit, own = found.get(name, (0.0, 0.0))
         change = -rows.per_unit * attempt.slope
         found[name] = (unit + outwards * float(np.sum(change)), own + float(change @ rows.own))
@@ -72,15 +72,22 @@ def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> fl
 
 def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:
     """Rows as `prices` returns them, from name -> (objective per SI unit of the limit, per unit of its own value)."""
-    kinds = units.kinds(problem.rotary)
     rows: list[dict[str, Any]] = []
     for name in dict.fromkeys([*found, *_names(problem)]):
         unit, own = found.get(name, (0.0, 0.0))
         acts = bool(value) and abs(own) > 1e-7 * abs(value)
         relative = 0.0 if not acts else None if _is_zero(problem, name) else own / 100 / value
-        symbol = kinds[name.partition(".")[0]].unit
-        rows.append({"name": name, "per_unit": unit if acts else 0.0, "unit": symbol, "per_percent": relative})
+        row = {"name": name, "per_unit": unit if acts else 0.0, "unit": _unit(problem, name), "per_percent": relative}
+        rows.append(row)
     return sorted(rows, key=lambda row: (not row["per_unit"], -abs(row["per_percent"] or 0.0)))
+
+
+def _unit(problem: Problem, name: str) -> str:
+    quantity, _, side = name.partition(".")
+    if side == "at_most":
+        (kind,) = {c.term.kind for c in problem.objective.ceilings or () if c.term.label == quantity}
+        return "1" if kind is None else units.kinds(problem.rotary)[kind].unit
+    return units.kinds(problem.rotary)[quantity].unit
 
 
 def _names(problem: Problem) -> list[str]:
@@ -89,13 +96,13 @@ def _names(problem: Problem) -> list[str]:
     for quantity, limit in problem.limits.given().items():
         sides = [f"{quantity}.{side}" for side in ("min", "max") if getattr(limit, side) is not None]
         names += [quantity] if limit.symmetric else sides
-    return names
+    return names + [f"{ceiling.term.label}.at_most" for ceiling in problem.objective.ceilings or ()]
 
 
 def _is_zero(problem: Problem, name: str) -> bool:
     """Whether a limit is zero, so that a percentage of it means nothing."""
     quantity, _, side = name.partition(".")
-    return bool(side) and getattr(problem.limits.given()[quantity], side) == 0.0
+    return side in ("min", "max") and getattr(problem.limits.given()[quantity], side) == 0.0
 
 
 def sentence(row: Mapping[str, Any], name: str, label: str) -> str:

@@ -245,23 +245,31 @@ def _touches(value: Any) -> int | None:
     return int(value)
 
 
+def refuse_wrong_norm(key: str, name: str, norm: norms.Norm | None) -> None:
+    """Raise ValueError for what cannot be measured, or not by this norm; ``key`` is what the field is called."""
+    if name not in MINIMIZABLE:
+        hint = nearest(name, MINIMIZABLE).partition("; known")[0]
+        raise ValueError(f"{key}: unknown {shown(name)}; one of {', '.join(MINIMIZABLE)}{hint}")
+    if name in WITHOUT_NORM and norm is not None:
+        raise ValueError(f"norm: {name} takes no norm; leave it out")
+    if name not in WITHOUT_NORM and norm is None:
+        raise ValueError(f"norm: is missing; {name} needs one of {', '.join(norms.names())}")
+
+
+NamedNorm = Annotated[norms.Norm | None, BeforeValidator(_norm), PlainSerializer(lambda n: n and n.name)]
+
+
 class Term(Section):
     """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt, copper loss or
     electrical energy (J, see `trajopt.motor`), or time (s)."""
 
     minimize: str
-    norm: Annotated[norms.Norm | None, BeforeValidator(_norm), PlainSerializer(lambda n: n and n.name)] = None
+    norm: NamedNorm = None
     weight: Annotated[float, BeforeValidator(_weight)] = 1.0
 
     @model_validator(mode="after")
     def _norm_fits(self) -> Self:
-        if self.minimize not in MINIMIZABLE:
-            hint = nearest(self.minimize, MINIMIZABLE).partition("; known")[0]
-            raise ValueError(f"minimize: unknown {shown(self.minimize)}; one of {', '.join(MINIMIZABLE)}{hint}")
-        if self.minimize in WITHOUT_NORM and self.norm is not None:
-            raise ValueError(f"norm: {self.minimize} takes no norm; leave it out")
-        if self.minimize not in WITHOUT_NORM and self.norm is None:
-            raise ValueError(f"norm: is missing; {self.minimize} needs one of {', '.join(norms.names())}")
+        refuse_wrong_norm("minimize", self.minimize, self.norm)
         return self
 
     @property
@@ -269,11 +277,62 @@ class Term(Section):
         """For people: ``jerk l2``, ``energy``."""
         return self.minimize if self.norm is None else f"{self.minimize} {self.norm.name}"
 
+    @property
+    def kind(self) -> str | None:
+        """What its value measures, a key of `trajopt.units.kinds`; None where that has no name of its own."""
+        if self.norm is None or self.norm.name in ("l2", "linf"):
+            return self.minimize
+        return _INTEGRALS.get(self.minimize) if self.norm.name == "l1" else None
+
+
+_INTEGRALS: Final = {
+    "velocity": "position", "acceleration": "velocity", "jerk": "acceleration", "snap": "jerk", "power": "energy",
+}  # fmt: skip
+
+
+def _ceiling(value: Any, info: ValidationInfo) -> float:
+    of, norm = info.data.get("of"), info.data.get("norm")
+    if of not in MINIMIZABLE or (norm is None) != (of in WITHOUT_NORM):
+        return 1.0  # refused below, in better words
+    kind = Term(minimize=of, norm=norm).kind
+    if kind is None and isinstance(value, str):
+        raise ValueError(f"the {getattr(norm, 'name', '')} norm of {of} has no unit in files; take linf or l2")
+    bound = si(value, kind or of, info)
+    if bound <= 0:
+        raise ValueError(f"must be > 0, got {shown(value)}")
+    return bound
+
+
+class Ceiling(Section):
+    """What another term may come to at most, SI: ``of`` and ``norm`` name it as in a Term (epsilon-constraint)."""
+
+    of: str
+    norm: NamedNorm = None
+    at_most: Annotated[float, BeforeValidator(_ceiling)]
+
+    @model_validator(mode="after")
+    def _norm_fits(self) -> Self:
+        refuse_wrong_norm("of", self.of, self.norm)
+        if self.of == "time":
+            raise ValueError('of: time is limited by a range, such as move.time = ["0.1 s", "1 s"]')
+        return self
+
+    @property
+    def term(self) -> Term:
+        """The term that is held."""
+        return Term(minimize=self.of, norm=self.norm)
+
 
 class Objective(Section):
-    """A weighted sum of terms (Clemen & Rupp eq. 26); weights multiply SI values."""
+    """A weighted sum of terms (Clemen & Rupp eq. 26); weights multiply SI values. ``ceilings`` hold further terms."""
 
     terms: tuple[Term, ...]
+    ceilings: tuple[Ceiling, ...] | None = None
+
+    @property
+    def all_terms(self) -> tuple[Term, ...]:
+        """What is minimised and what is held."""
+        return (*self.terms, *(ceiling.term for ceiling in self.ceilings or ()))
 
     @model_validator(mode="before")
     @classmethod
@@ -381,7 +440,7 @@ class Problem(Section):
     def order(self) -> int:
         """Which derivative is the top one, piecewise constant: 4 (snap) when snap or a boundary jerk is mentioned,
         3 (jerk) when jerk or a boundary acceleration is, else 2; the Euler scheme always carries jerk (eq. 4)."""
-        mentioned = {*self.limits.given(), *(term.minimize for term in self.objective.terms)}
+        mentioned = {*self.limits.given(), *(term.minimize for term in self.objective.all_terms)}
         states = (self.move.start, self.move.end, *self.move.via)
         if "snap" in mentioned or any(state.jerk is not None for state in states):
             return 4

@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -39,11 +39,14 @@ _EXAMPLES: Final = {  # what to write for what is missing
     "vibration.frequency": 'write [[vibration]] with frequency = "8 Hz"',
     "objective": 'write [objective] with minimize = "jerk" and norm = "l2"',
     "objective.terms": 'write minimize = "jerk" and norm = "l2", or terms',
+    "objective.ceilings.of": 'write for example of = "energy"',
+    "objective.ceilings.at_most": 'write for example at_most = "0.9 J"',
     "objective.terms.minimize": f"write minimize = one of {', '.join(p.MINIMIZABLE)}",
 }
 _LISTS: Final = {
     "vibration": '[{ frequency = "8 Hz" }]',
     "via": '[{ time = "0.5 s", position = "0.1 m" }]',
+    "ceilings": '[{ of = "energy", at_most = "0.9 J" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
 _KEY_EXAMPLE: Final = 'for example move.end.position="0.3 m"'
@@ -338,14 +341,20 @@ def _keys(loc: Sequence[int | str], root: type[BaseModel]) -> list[str]:
     for part in loc:
         if isinstance(part, int):
             continue
-        annotation = model.model_fields[part].annotation
-        models = [a for a in (annotation, *getattr(annotation, "__args__", ())) if isinstance(a, type)]
+        models = [a for a in _named_in(model.model_fields[part].annotation) if isinstance(a, type)]
         model = next((m for m in models if issubclass(m, BaseModel)), None)
         if model is None:
             return []
     aliases = _ALIASES.get(str(loc[-1]), {}) if loc else {}
     extra = ["minimize", "norm", "weight"] if model is p.Objective else ["plant"] if model is p.Problem else []
     return [*model.model_fields, *aliases, *extra]
+
+
+def _named_in(annotation: Any) -> Iterator[Any]:
+    """An annotation and all that it is made of."""
+    yield annotation
+    for part in getattr(annotation, "__args__", ()):
+        yield from _named_in(part)
 
 
 def refused(name: str, message: str) -> BadInput:

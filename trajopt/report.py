@@ -46,6 +46,8 @@ def print_solution(solution: Solution | PlantSolution) -> None:
         return
     assert solution.objective is not None and solution.duration is not None
     console.print(f"minimised {objective_text(solution)}, in {solution.duration:.9g} s")
+    for ceiling in solution.problem.objective.ceilings or ():
+        console.print(f"with {solution.problem.shown(ceiling.term.label)} at most {ceiling.at_most:.9g} (SI)")
     console.print(_table(solution))
     console.print(certificate_text(solution))
     if (optimum := solution.certificate.get("continuous_optimum")) is not None:

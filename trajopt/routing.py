@@ -86,7 +86,7 @@ def is_time_search(problem: Problem) -> bool:
     Feasibility is monotone in the duration when one end is at rest: the axis can wait there. Elsewhere a range can be
     searched where the durations that are possible are known.
     """
-    only_time = [term.minimize for term in problem.objective.terms] == ["time"]
+    only_time = [term.minimize for term in problem.objective.all_terms] == ["time"]
     return problem.move.fixed_time is None and only_time and (problem.can_wait or _knows_possible_times(problem))
 
 
@@ -119,7 +119,7 @@ def _nonconvex(problem: Problem) -> str:
         if is_time_search(problem):
             return ""
         return "the duration is free: step times velocity is a product of unknowns"
-    for term in problem.objective.terms:
+    for term in problem.objective.all_terms:
         if not is_affine(problem, term.minimize):
             return f"{term.label} is nonconvex: " + (
                 "friction changes sign with the velocity"
@@ -135,6 +135,8 @@ def _not_quadratic(problem: Problem) -> str:
     if problem.limits.rms_force is not None:
         return "an RMS limit is a second-order cone"
     norms_used = [term.norm for term in problem.objective.terms if term.norm]
+    if any(ceiling.norm and ceiling.norm.name == "l2" for ceiling in problem.objective.ceilings or ()):
+        return "a ceiling on an l2 norm is a second-order cone"
     if len(norms_used) > 1 and any(norm.name == "l2" for norm in norms_used):
         return "an l2 norm in a weighted sum is a second-order cone"
     unknown = [norm.name for norm in norms_used if norm.name not in ("l1", "l2", "linf")]
@@ -150,5 +152,6 @@ def _convex_reason(problem: Problem) -> str:
     kind = {frozenset({"l2"}): "quadratic", frozenset({"copper_loss"}): "quadratic"}.get(
         frozenset(norms_used), "linear" if norms_used <= {"l1", "linf"} else "cone"
     )
-    kind = "cone" if problem.limits.rms_force is not None else kind
+    held = {ceiling.norm.name for ceiling in problem.objective.ceilings or () if ceiling.norm}
+    kind = "cone" if "l2" in held or problem.limits.rms_force is not None else kind
     return f"convex: a {kind} program{condition}"

@@ -208,14 +208,11 @@ class Solution:
             "vibration.png": self.plot_vibration,
             "arcs.png": lambda: self.plot_arcs()[0],
         }
-        written = [directory / "result.json"]
-        for stale in ("trajectory.csv", *pictures):  # of another answer
+        for stale in pictures:  # of another answer
             (directory / stale).unlink(missing_ok=True)
-        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
+        written = self.save_data(directory)
         if self.trajectory is None:
             return written
-        written.append(directory / "trajectory.csv")
-        write_atomically(written[-1], self.csv().encode())
         if not self.problem.vibration:
             del pictures["vibration.png"]
         if self.route.model != "arcs":
@@ -224,6 +221,18 @@ class Solution:
             figure: Any = draw().figure
             figure.savefig(directory / name, dpi=150)
             written.append(directory / name)
+        return written
+
+    def save_data(self, directory: Path) -> list[Path]:
+        """Write result.json and, with a solution, trajectory.csv into ``directory``; returns the paths. Raises
+        OSError."""
+        directory.mkdir(parents=True, exist_ok=True)
+        written = [directory / "result.json", directory / "trajectory.csv"]
+        written[1].unlink(missing_ok=True)
+        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
+        if self.trajectory is None:
+            return written[:1]
+        write_atomically(written[1], self.csv().encode())
         return written
 
     def __repr__(self) -> str:

@@ -33,10 +33,11 @@ _DRAWN = 3e-9  # of a limit
 _LATER = 2e-8  # of a least time
 
 
-def solve(problem: Problem, seconds: float | None = None) -> Solution:
-    """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only."""
+def solve(problem: Problem, seconds: float | None = None, start: Trajectory | None = None) -> Solution:
+    """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only. A local
+    solver that would try several starts takes ``start``, the answer of a neighbouring problem, alone."""
     clock = Clock(seconds)
-    solution = _solve(problem, clock)
+    solution = _solve(problem, clock, start)
     if solution.trajectory is None:
         return solution
     since = perf_counter()
@@ -50,7 +51,7 @@ def solve(problem: Problem, seconds: float | None = None) -> Solution:
     return replace(solution, certificate=found, structure={**structure, **solution.structure}, timings=clock.timings())
 
 
-def _solve(problem: Problem, clock: Clock) -> Solution:
+def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution:
     """The checked answer, or the verdict."""
     chosen = route(problem)
     setting = Setting.of(problem)
@@ -66,7 +67,7 @@ def _solve(problem: Problem, clock: Clock) -> Solution:
         on_mesh = route_on_mesh(problem)
         chosen = on_mesh.because(f"{on_mesh.reason} (switching times: {solution.message})")
     if chosen.model == "pyomo":
-        return _local(setting, chosen, clock)
+        return _local(setting, chosen, clock, start)
     lean = without(setting, nonaffine_limits(problem))  # an answer that keeps those too is as good as with them
     if problem.move.fixed_time is None:
         solution, attempt = _shortest(setting, lean, chosen, clock)
@@ -97,7 +98,7 @@ def _by_arcs(setting: Setting, chosen: Route, clock: Clock) -> Solution:
 
 
 def _is_affine(problem: Problem) -> bool:
-    return all(is_affine(problem, term.minimize) for term in problem.objective.terms)
+    return all(is_affine(problem, term.minimize) for term in problem.objective.all_terms)
 
 
 def _coasting(setting: Setting) -> Attempt | None:
@@ -209,10 +210,10 @@ def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: C
     return conclude(setting, chosen, replace(local, bound=bound), clock, local=True)
 
 
-def _local(setting: Setting, chosen: Route, clock: Clock) -> Solution:
+def _local(setting: Setting, chosen: Route, clock: Clock, start: Trajectory | None) -> Solution:
     """Ipopt from several moves within the limits that are convex; if there is none, the move is impossible."""
     problem = setting.problem
-    answer = _from_several_starts(setting, without(setting, nonaffine_limits(problem)), clock)
+    answer = _from_several_starts(setting, without(setting, nonaffine_limits(problem)), clock, start)
     if answer.trajectory is None and isinstance(problem.move.time, tuple) and problem.can_wait:
         kinematic = without(setting, nonaffine_limits(problem))
         longest = convex(kinematic, problem.move.time[1], to(smoothest(problem)), clock)
@@ -224,12 +225,17 @@ def _local(setting: Setting, chosen: Route, clock: Clock) -> Solution:
     return conclude(setting, chosen, answer, clock, local=True)
 
 
-def _from_several_starts(setting: Setting, lean: Setting, clock: Clock) -> Attempt:
-    """The best of the local optima that Ipopt finds, with a note on how many starts there were and how many agreed."""
+def _from_several_starts(
+    setting: Setting, lean: Setting, clock: Clock, given: Trajectory | None = None
+) -> Attempt:
+    """The best of the local optima that Ipopt finds, with a note on how many starts there were and how many agreed;
+    where a start is ``given`` and leads to one, from that alone."""
     goal = to(setting.problem.objective)
     found: list[Attempt] = []
     failed: list[Attempt] = []
-    for start in _starts(setting, lean, clock):
+    if given is not None:
+        found = [x for x in [nonconvex(setting, goal, clock, given)] if x.trajectory is not None]
+    for start in _starts(setting, lean, clock) if not found else ():
         if start.trajectory is None:
             failed.append(start)
             break

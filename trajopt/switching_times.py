@@ -42,7 +42,7 @@ def as_chain(problem: Problem) -> Chain | None:
     kinematic = limits.keys() <= {*DERIVATIVES, "force"}
     more = move.via or problem.vibration or problem.transcription.scheme != "exact" or not kinematic
     timed = move.fixed_time is None and [term.minimize for term in problem.objective.terms] == ["time"]
-    if more or not timed or any(limit.varies for limit in limits.values()):
+    if more or problem.objective.ceilings or not timed or any(limit.varies for limit in limits.values()):
         return None
     accelerations = _acceleration(problem)
     states = [state.fixed(problem.order) for state in (move.start, move.end)]

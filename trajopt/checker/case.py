@@ -115,6 +115,7 @@ class Case:
     has_certificate: bool
     vibration: tuple[Mode, ...] = ()
     rotary: bool = False
+    ceilings: tuple[tuple[str, str | None, float], ...] = ()
 
     @property
     def count(self) -> int:

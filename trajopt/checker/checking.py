@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from trajopt.checker.reading import Malformed, read
 from trajopt.checker.report import Check, Report, question
 from trajopt.checker.result_file import CheckerInputError, read_json, table_fault
 from trajopt.checker.vibration import vibration_checks
+
+FRONT: Final = "trajopt front 1"
 
 
 def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *, strict: bool = False) -> Report:
@@ -48,9 +50,15 @@ def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None =
     """Check the result file at ``path``, its seal, and a trajectory.csv or command.csv beside a result.json, which must
     say the same.
 
+    Of a front.json every point's result is checked, and what is claimed of the front (see `trajopt.checker.front`).
     Raises CheckerInputError when the file cannot be read as JSON data at all.
     """
     result = read_json(Path(path))
+    if result.get("format") == FRONT:
+        from trajopt.checker.front import front_checks
+
+        found, unknown = front_checks(Path(path), result)
+        return _report([question("seal", _seal_fault(result)), *found], False, strict, unknown)
     report = check(result, problem, strict=strict)
     report = replace(report, checks=(question("seal", _seal_fault(result)), *report.checks))
     if result.get("format") == FORMAT:

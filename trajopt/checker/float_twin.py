@@ -345,6 +345,12 @@ class FloatTwin:
         noise = np.full_like(values, self.noise(quantity))
         return _norm(norm, values, weights, duration), _norm(norm, noise, weights, duration)
 
+    def excess_of_term(self, name: str, norm: str | None, most: float) -> Found:
+        """By how much a term exceeds its ceiling, by the convention on friction at rest that makes the least of it."""
+        found = [self.term(name, norm, convention) for convention in self.case.conventions(name)]
+        value, rounding = min(found)
+        return Found(max(value - most, 0.0), None, rounding + 1e-12 * abs(value))
+
     def counted(self, values: Array) -> Array:
         """Electrical power as it counts: of what is fed back the share that is recovered."""
         assert self.case.motor is not None

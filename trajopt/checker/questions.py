@@ -70,6 +70,11 @@ def tasks_of(case: Case, quick: FloatTwin, relative: float, notes: list[str]) ->
             continue
         tolerance = _limit_tolerance(case, name, quick.peak(name), relative)
         tasks.append(_Task(f"limit {name}", tolerance, methodcaller("excess", name, tolerance)))
+    for name, norm, most in case.ceilings:
+        if norm is not None and norm not in _NORMS:
+            notes.append(f"ceiling on {name} (norm {norm} is not the checker's)")
+            continue
+        tasks.append(_Task(f"ceiling {name}", relative * most, methodcaller("excess_of_term", name, norm, most)))
     return tasks + _value_tasks(case, quick, notes)
 
 

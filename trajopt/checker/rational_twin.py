@@ -323,6 +323,11 @@ class RationalTwin:
             values = [value - values[0] for value in values]
         return _norm_exactly(norm, values, weights, Fraction(1 if self.euler else self.case.end_time))
 
+    def excess_of_term(self, name: str, norm: str | None, most: float) -> Found:
+        """See `FloatTwin.excess_of_term`."""
+        value = min(self.term(name, norm, convention) for convention in self.case.conventions(name))
+        return Found(max(value - Fraction(most), Fraction(0)))
+
     def counted(self, value: Fraction) -> Fraction:
         assert self.case.motor is not None
         return value if value > 0 else Fraction(self.case.motor.recovery) * value

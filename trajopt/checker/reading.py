@@ -73,14 +73,15 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
     motor = _motor(load)
     mixes = _mixes(motor)
     limits = _limits(problem.get("limits", {}), mixes)
-    terms = _terms(problem.get("objective"))
-    order = _order(move, limits, terms, grid.get("scheme"))
+    goal = _mapping(problem.get("objective"), "problem.objective", ("terms", "ceilings"))
+    terms, ceilings = _terms(goal.get("terms")), _ceilings(goal.get("ceilings"))
+    mentioned = {*limits, *(name for name, _, _ in (*terms, *ceilings))}
+    order = _order(move, mentioned, grid.get("scheme"))
     time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
     inertia = None if load.get("inertia") is None else _curve(load["inertia"], "load.inertia")
-    named = {*limits, *(name for name, _, _ in terms)}
-    if inertia is None and named - {*DERIVATIVES, "time"}:
+    if inertia is None and mentioned - {*DERIVATIVES, "time"}:
         raise Malformed("a limit or an objective of force or power needs load.inertia")
-    if motor is None and named & {*ELECTRICAL, "brake_energy", "copper_loss", "electrical_energy"}:
+    if motor is None and mentioned & {*ELECTRICAL, "brake_energy", "copper_loss", "electrical_energy"}:
         raise Malformed("a limit or an objective of the motor needs load.torque_constant and load.resistance")
     return Case(
         scheme=grid["scheme"], order=order, time=time, signal=signal,
@@ -90,7 +91,8 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
         coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
         viscous=_number(load.get("viscous", 0.0), "load.viscous"),
         motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
-        terms=terms, move_time=_move_time(move.get("time")), intervals=_whole(grid.get("intervals"), "intervals"),
+        terms=terms, ceilings=ceilings, move_time=_move_time(move.get("time")),
+        intervals=_whole(grid.get("intervals"), "intervals"),
         objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
         metrics={
             str(name): _number(value, f"metrics.{name}")
@@ -239,28 +241,43 @@ def _sides(value: Any) -> Iterator[tuple[str, tuple[Fraction, Fraction], float]]
 def _terms(value: Any) -> tuple[tuple[str, str | None, float], ...]:
     """(quantity, norm or None, weight) of each term."""
     found = []
-    terms = _mapping(value, "problem.objective").get("terms")
-    for term in terms if isinstance(terms, list | tuple) else ():
+    for term in value if isinstance(value, list | tuple) else ():
         term = _mapping(term, "an objective term", ("minimize", "norm", "weight"))
-        name, norm = term.get("minimize"), term.get("norm")
-        if name not in (*DERIVATIVES, *LOADED, *ELECTRICAL, *POWERS, "time"):
-            raise Malformed(f"the objective minimizes {shown(name)}, which this checker does not know")
-        if (norm is None) != (name in (*POWERS, "time")) or not isinstance(norm, str | None):
-            raise Malformed(f"the norm of {name} is {shown(norm)}")
+        name, norm = _measured(term.get("minimize"), term.get("norm"))
         found.append((name, norm, _nonnegative(term.get("weight", 1.0), "weight")))
     if not found:
         raise Malformed("problem.objective.terms is missing or empty")
     return tuple(found)
 
 
-def _order(move: Mapping[str, Any], limits: Iterable[str], terms: Iterable[tuple[str, Any, Any]], scheme: Any) -> int:
+def _ceilings(value: Any) -> tuple[tuple[str, str | None, float], ...]:
+    """(quantity, norm or None, most) of each ceiling."""
+    if not isinstance(value, list | tuple | None):
+        raise Malformed("problem.objective.ceilings is not a list")
+    found = []
+    for ceiling in value or ():
+        ceiling = _mapping(ceiling, "a ceiling", ("of", "norm", "at_most"))
+        name, norm = _measured(ceiling.get("of"), ceiling.get("norm"))
+        found.append((name, norm, _nonnegative(ceiling.get("at_most"), "at_most")))
+    return tuple(found)
+
+
+def _measured(name: Any, norm: Any) -> tuple[str, str | None]:
+    """What an objective measures, and by which norm."""
+    if name not in (*DERIVATIVES, *LOADED, *ELECTRICAL, *POWERS, "time"):
+        raise Malformed(f"the objective names {shown(name)}, which this checker does not know")
+    if (norm is None) != (name in (*POWERS, "time")) or not isinstance(norm, str | None):
+        raise Malformed(f"the norm of {name} is {shown(norm)}")
+    return name, norm
+
+
+def _order(move: Mapping[str, Any], mentioned: set[str], scheme: Any) -> int:
     """Which derivative the problem makes the top one: the highest mentioned, a state's own being one below the top."""
     if scheme not in ("exact", "euler"):
         raise Malformed(f"problem.transcription.scheme is {shown(scheme)}")
-    mentioned = {*limits, *(name for name, _, _ in terms)}
     via = move.get("via", ())
     for state in (move.get("start", {}), move.get("end", {}), *(via if isinstance(via, list | tuple) else ())):
-        mentioned |= {f"{key} in a state" for key in _mapping(state, "a state") if state[key] is not None}
+        mentioned = mentioned | {f"{key} in a state" for key in _mapping(state, "a state") if state[key] is not None}
     if mentioned & {"snap", "jerk in a state"}:
         return 4
     return 3 if scheme == "euler" or mentioned & {"jerk", "acceleration in a state"} else 2
