@@ -86,11 +86,11 @@ def _linearised_at(reference: Trajectory) -> Any:
     class Linearised(Quantities):
         def _power(self) -> Signal:
             pairs = zip(self.ends("force", "velocity"), forces, strict=True)
-            return signals.sampled([_product_at(self.model, x, x0) for x, x0 in pairs])
+            return signals.sampled([_product_at(self.model, x, x0) for x, x0 in pairs], self.signal("force"))
 
         def _electrical_power(self) -> Signal:
             here = self.ends("force", "acceleration", "velocity", "current")
-            return signals.sampled([self._drawn(x, x0) for x, x0 in zip(here, at, strict=True)])
+            return signals.sampled([self._drawn(x, x0) for x, x0 in zip(here, at, strict=True)], self.signal("force"))
 
         def _drawn(self, here: Any, there: Any) -> Any:
             (_, a, v, u), (_, a0, v0, u0) = here, there

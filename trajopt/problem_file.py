@@ -46,9 +46,10 @@ _LISTS: Final = {
     "via": '[{ time = "0.5 s", position = "0.1 m" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
+_WANTED: Final = "a problem file or a ready-made problem's name"
 _SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"
 _ALIASES: Final = {
-    "load": {"mass": "inertia", "force_constant": "torque_constant"},
+    "load": {"mass": "inertia", "force_constant": "torque_constant", "torque": "force"},
     "limits": {"torque": "force", "rms_torque": "rms_force"},
 }
 
@@ -59,11 +60,13 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
     Raises BadInput with one line naming the file, the field and the remedy.
     """
     source = _find(Path(path))
-    return parse(read_text(source), overrides, name=str(path))
+    return parse(read_text(source), overrides, str(path), source.parent)
 
 
-def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem:
-    """The problem stated by a TOML text. Raises BadInput."""
+def parse(
+    text: str, overrides: Sequence[str] = (), name: str = "problem", folder: Path | None = None
+) -> p.Problem | PlantProblem:
+    """The problem stated by a TOML text, with the tables it names in ``folder`` (here, by default). Raises BadInput."""
     _refuse_marks(text, name)
     _refuse_deep(text, name)
     try:
@@ -72,18 +75,19 @@ def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.
         raise _refused(name, f"not a TOML file: {_remedied(str(error))}") from None
     for override in overrides:
         _override(data, override)
-    return from_dict(data, name)
+    return from_dict(data, name, folder)
 
 
-def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem:
+def from_dict(data: dict[str, Any], name: str = "problem", folder: Path | None = None) -> p.Problem | PlantProblem:
     """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
     if "plant" in data:
         return _plant(data, name)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
+    context = {"rotary": rotary, "texts_only": True, "folder": folder or Path()}
     try:
-        return p.Problem.model_validate({"rotary": rotary, **data}, context={"rotary": rotary, "texts_only": True})
+        return p.Problem.model_validate({"rotary": rotary, **data}, context=context)
     except ValidationError as error:
         raise _refused(name, _as_written(explain(error), written)) from None
 
@@ -100,23 +104,23 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
         raise _refused(name, explain(error, PlantProblem)) from None
 
 
-def read_text(path: Path) -> str:
-    """The text of a regular UTF-8 file of at most 1 MB. Raises BadInput."""
+def read_text(path: Path, largest: int = LARGEST_FILE, wanted: str = _WANTED) -> str:
+    """The text of a regular UTF-8 file of at most ``largest`` bytes. Raises BadInput."""
     name = str(path)
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
         try:
             regular = stat.S_ISREG(os.fstat(handle).st_mode)
-            raw = _first_bytes(handle, LARGEST_FILE + 1) if regular else b""
+            raw = _first_bytes(handle, largest + 1) if regular else b""
         finally:
             os.close(handle)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise _refused(name, f"cannot be read: {reason}; give a problem file or a ready-made problem's name") from None
+        raise _refused(name, f"cannot be read: {reason}; give {wanted}") from None
     if not regular:
-        raise _refused(name, "not a regular file; give a problem file")
-    if len(raw) > LARGEST_FILE:
-        raise _refused(name, "larger than 1 MB; a problem file takes a few lines")
+        raise _refused(name, f"not a regular file; give {wanted}")
+    if len(raw) > largest:
+        raise _refused(name, f"larger than {largest // 1_000_000} MB; give {wanted}")
     if raw.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")) or b"\0" in raw:
         raise _refused(name, _SAVE_PLAIN)
     try:
