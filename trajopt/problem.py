@@ -384,8 +384,21 @@ def _printable(text: str) -> str:
 OneLine = Annotated[str, AfterValidator(_printable)]
 
 
+def _within(limit: Limit | None, curve: Curve) -> Limit:
+    """A position limit that also keeps within the table of a curve."""
+
+    def side(bound: float | Table | None, otherwise: float) -> float | Table:
+        if isinstance(bound, Table):
+            return bound.model_copy(update={"value": tuple(np.clip(bound.value, *curve.span).tolist())})
+        return otherwise if bound is None else float(np.clip(bound, *curve.span))
+
+    low, high = curve.span
+    limit = limit or Limit()
+    return Limit(min=side(limit.min, low), max=side(limit.max, high))
+
+
 class Problem(Section):
-    """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy."""
+    """A move to optimise. A load over position keeps the position within its table. Frozen; ``problem.replace(...)`` gives a changed copy."""
 
     move: Move
     objective: Objective
@@ -402,6 +415,9 @@ class Problem(Section):
     def _consistent(self) -> Self:
         from trajopt.preflight import refuse_contradictions
 
+        for curve in self.load.curves.values():  # beyond its table the load is unknown
+            limits = self.limits.model_copy(update={"position": _within(self.limits.position, curve)})
+            self.__dict__["limits"] = limits
         refuse_contradictions(self)
         return self
 

@@ -75,8 +75,9 @@ class Quantities:
         return found[0] if len(found) == 1 else signals.plus(model, *found)
 
     def returned(self) -> Signal:
-        """An upper bound on the power that a motor feeds back, -P, by polynomials: |u| is more than its own smoothed
-        sign times u, and |u|^γ more than its tangent at the middle of an interval."""
+        """An upper bound on the power that a motor feeds back, -P, by polynomials, or by values where the load is one over
+        position: |u| is more than its own smoothed sign times u, and |u|^γ more than its tangent at the middle of an
+        interval."""
         load, model, count = self.problem.load, self.model, self.mesh.intervals
         assert load.motor is not None
         current, velocity, force = (self.signal(name) for name in ("current", "velocity", "force"))
@@ -192,6 +193,13 @@ class Quantities:
             friction = load.coulomb * (way or self.model.signs(Signal(velocity, ()), self.sizes.derivative[1])[0])
         position = position + (problem.move.start_position or 0.0)
         return force_along(self.model, load, position, velocity, acceleration) + friction
+
+    def holding(self) -> Any:
+        """The force that holds a load over position at the end of the move."""
+        force, move = self.problem.load.force, self.problem.move
+        if force is None:
+            return 0.0
+        return self.model.along(self.chain[0][-1:] + (move.start_position or 0.0), [(force, 0)])[0][0]
 
     def _inertia(self) -> Signal:
         inertia = self.problem.load.inertia

@@ -69,6 +69,7 @@ def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
     mass = 0.0 if inertia is None else inertia if isinstance(inertia, float) else max(inertia.value)
     load = problem.load
     force = mass * derivative[2] + load.viscous * derivative[1] + load.coulomb
+    force += 0.0 if load.force is None else max(map(abs, load.force.value))
     return _with_motor(load, Sizes(tuple(derivative), duration, force or 1.0))
 
 

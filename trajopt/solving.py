@@ -124,7 +124,8 @@ def _coasting(setting: Setting) -> Attempt | None:
 def _may_earn(problem: Problem) -> bool:
     """Whether the objective can be negative from an end to one of the same velocity: braking a load that has grown
     heavier gives back more than speeding it up has taken."""
-    recovers = problem.load.recovery > 0 and not isinstance(problem.load.inertia, float)
+    load = problem.load
+    recovers = load.recovery > 0 and (bool(load.curves) or not isinstance(load.inertia, float))
     return recovers and any(term.minimize == "electrical_energy" for term in problem.objective.terms)
 
 

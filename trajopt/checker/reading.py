@@ -21,6 +21,7 @@ from trajopt.checker.case import (
     Motor,
     Via,
 )  # fmt: skip
+from trajopt.checker.splines import DEGREE, Spline
 
 FORMAT: Final = "trajopt result 1"
 WITH_SOLUTION: Final = ("SOLVED", "SOLVED_LOCAL")
@@ -69,14 +70,19 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
     notes += [f"problem.{key}" for key in problem if key not in known]
     grid = _mapping(problem.get("transcription"), "problem.transcription")
     move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via", "dwell"))
-    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "coulomb", "viscous", *_MOTOR))
+    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "force", "coulomb", "viscous", *_MOTOR))
     motor = _motor(load)
     mixes = _mixes(motor)
     limits = _limits(problem.get("limits", {}), mixes)
     terms = _terms(problem.get("objective"))
     order = _order(move, limits, terms, grid.get("scheme"))
     time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
-    inertia = None if load.get("inertia") is None else _curve(load["inertia"], "load.inertia")
+    inertia, force = _inertia(load.get("inertia")), None
+    if load.get("force") is not None:
+        force = _spline(load["force"], "load.force")
+    for spline in (inertia, force):
+        if isinstance(spline, Spline):
+            _within(spline, limits, grid.get("scheme"))
     named = {*limits, *(name for name, _, _ in terms)}
     if inertia is None and named - {*DERIVATIVES, "time"}:
         raise Malformed("a limit or an objective of force or power needs load.inertia")
@@ -86,7 +92,7 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
         scheme=grid["scheme"], order=order, time=time, signal=signal,
         start=_state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0),
         end=_state(move.get("end"), "move.end", order, {}, 0.0),
-        via=_via(move.get("via", ()), order), limits=limits, inertia=inertia,
+        via=_via(move.get("via", ()), order), limits=limits, inertia=inertia, force=force,
         coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
         viscous=_number(load.get("viscous", 0.0), "load.viscous"),
         motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
@@ -173,6 +179,29 @@ def _curve(value: Any, where: str) -> Curve:
     if len(times) != len(values) or len(times) == 0 or not np.all(np.diff(times) > 0):
         raise Malformed(f"{where} is no table: as many values as times, and times must increase")
     return Curve(tuple(times.tolist()), tuple(values.tolist()))
+
+
+def _inertia(value: Any) -> Curve | Spline | None:
+    if isinstance(value, Mapping) and "position" in value:
+        return _spline(value, "load.inertia")
+    return None if value is None else _curve(value, "load.inertia")
+
+
+def _spline(value: Any, where: str) -> Spline:
+    table = _mapping(value, where, ("position", "value"))
+    position, values = (_vector(table.get(key), f"{where}.{key}") for key in ("position", "value"))
+    if len(position) != len(values) or len(position) <= DEGREE or not np.all(np.diff(position) > 0):
+        raise Malformed(f"{where} is no table: {DEGREE + 1} rows or more, and positions must increase")
+    return Spline(position, values)
+
+
+def _within(spline: Spline, limits: Mapping[str, tuple[Curve | None, Curve | None]], scheme: Any) -> None:
+    """A load over position is known within its table only, and between the nodes of the exact scheme."""
+    low, high = limits.get("position", (None, None))
+    if low is None or high is None or min(low.value) < spline.position[0] or max(high.value) > spline.position[-1]:
+        raise Malformed("a load over position needs limits.position within its table")
+    if scheme != "exact":
+        raise Malformed("a load over position needs the exact scheme")
 
 
 def _motor(load: Mapping[str, Any]) -> Motor | None:
