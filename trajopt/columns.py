@@ -1,4 +1,4 @@
-"""CSV tables with units in their header, such as ``theta [deg],J [kg m^2],T [N m]``: columns found by what they measure.
+"""CSV tables with units in their header, ``theta [deg],J [kg m^2],T [N m]``: columns are found by what they measure.
 
 Nothing is guessed: a column without a unit is refused, for an angle in degrees taken for radians still looks like a
 table.
@@ -97,7 +97,8 @@ def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise ValueError(f"{path}: row {line}: {name} is {shown(cell.strip())}, no finite number; fill or drop the row")
+            got = shown(cell.strip())
+            raise ValueError(f"{path}: row {line}: {name} is {got}, no finite number; fill it, or drop the row")
         found.append(number)
     return found
 

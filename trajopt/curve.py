@@ -76,7 +76,8 @@ class Curve(Section):
         """The least value anywhere between the first and the last row."""
         from scipy.interpolate import PPoly
 
-        corners = PPoly.from_spline(self.spline.derivative()).roots(discontinuity=False, extrapolate=False)
+        slope: Any = self.spline.derivative()
+        corners = PPoly.from_spline(slope).roots(discontinuity=False, extrapolate=False)
         return float(np.min(self.at(np.concatenate([self.position, corners[np.isfinite(corners)]]))))
 
 
@@ -105,7 +106,7 @@ def _refuse(position: tuple[float, ...], value: tuple[float, ...]) -> None:
 
 
 def read_curve(value: Any, kind: str, info: ValidationInfo) -> Curve:
-    """A Curve from ``{ position = [...], value = [...] }`` or ``{ csv = "file" }``, the file beside the problem file."""
+    """A Curve from ``{ position = [...], value = [...] }`` or ``{ csv = "file" }``, beside the problem file."""
     refuse_unknown(value, ("position", "value", "csv", "column"))
     if "csv" in value:
         if "position" in value or "value" in value:

@@ -137,14 +137,14 @@ class NonconvexModel:
         """Variables for derivatives of curves at positions, which Ipopt sees with their exact derivatives.
 
         A spline has no expression without branches, so the rows ``value - curve(position) = 0`` go to the solver as
-        ``value - position = 0`` and are put right by `_CurvedNLP`. Positions keep within the tables, or a little beyond.
+        ``value - position = 0`` and are put right by `_curved`. Positions keep within the tables, or a little beyond.
         """
         low, high = max(c.span[0] for c, _ in wanted), min(c.span[1] for c, _ in wanted)
         reach = (high - low) * _BEYOND
         count, span = len(position), high - low
         x = self.vector(count, span, np.full(count, low - reach), np.full(count, high + reach))
         self.zero(position - x, span)
-        found = []
+        found: list[Any] = []
         for curve, order in wanted:
             size = float(np.max(np.abs(curve.at(np.array(curve.position), order)))) or 1.0
             y = self.vector(count, size, np.full(count, -np.inf), np.full(count, np.inf))

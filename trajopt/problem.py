@@ -194,8 +194,9 @@ class Load(Section):
     """What is moved: force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13 to 15), and by which motor.
 
     ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, a Table over time
-    (Remark 1), or a Curve over position, which adds ½ J'(q) v². ``force``: the load's own over position, such as that of
-    gravity, which adds to it (N or N m; Van Oosterwyck et al. eq. 1). ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor see `trajopt.motor`: ``torque_constant``
+    (Remark 1), or a Curve over position, which adds ½ J'(q) v² (Van Oosterwyck et al. eq. 1). ``force``: the load's own
+    over position, N or N m, such as that of gravity. ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor see
+    `trajopt.motor`: ``torque_constant``
     N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)² or (A rad/s)², ``hysteresis`` W per m/s
     or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it feeds back can be used.
     """
@@ -398,7 +399,10 @@ def _within(limit: Limit | None, curve: Curve) -> Limit:
 
 
 class Problem(Section):
-    """A move to optimise. A load over position keeps the position within its table. Frozen; ``problem.replace(...)`` gives a changed copy."""
+    """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy.
+
+    A load over position keeps the position within its table, as a limit.
+    """
 
     move: Move
     objective: Objective

@@ -75,9 +75,8 @@ class Quantities:
         return found[0] if len(found) == 1 else signals.plus(model, *found)
 
     def returned(self) -> Signal:
-        """An upper bound on the power that a motor feeds back, -P, by polynomials, or by values where the load is one over
-        position: |u| is more than its own smoothed sign times u, and |u|^γ more than its tangent at the middle of an
-        interval."""
+        """An upper bound on the power that a motor feeds back, -P, by polynomials (by values for a load over position):
+        |u| is more than its own smoothed sign times u, and |u|^γ more than its tangent at the middle of an interval."""
         load, model, count = self.problem.load, self.model, self.mesh.intervals
         assert load.motor is not None
         current, velocity, force = (self.signal(name) for name in ("current", "velocity", "force"))
@@ -177,7 +176,8 @@ class Quantities:
                 self._at(*(x.within(self.model, s) for x in (position, velocity, acceleration))) for s in _FITTED
             ]
             return signals.fitted(values, _FITTED)
-        inner = Signal(None, (), LOBATTO) if acceleration.nodes is None else Signal(acceleration.nodes, (), LOBATTO[1:-1])
+        jumps = acceleration.nodes is None
+        inner = Signal(acceleration.nodes, (), LOBATTO if jumps else LOBATTO[1:-1])
         where = zip(*(x.where(self.model, inner) for x in (position, velocity, acceleration)), strict=True)
         force = signals.sampled([self._at(q, v, a) for q, v, a in where], inner)
         if not isinstance(self.model, OnFloats):  # its variables join the model once

@@ -1,9 +1,9 @@
 """Signals over the mesh: what a limit bounds, a norm measures and a load turns into force and power.
 
 A signal is a polynomial on every interval, held by its Bernstein coefficients: they bound it between nodes, and sums
-and products of polynomials are sums and products of coefficients. What a load over position makes is none; it is held by
-its values at the Lobatto points of every interval, whose weights integrate polynomials of degree five exactly. The same
-code works on the expressions of any model and on floats.
+and products of polynomials are sums and products of coefficients. What a load over position makes is none; it is held
+by its values at the Lobatto points of every interval, whose weights integrate polynomials of degree five exactly. The
+same code works on the expressions of any model and on floats.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
 
 if TYPE_CHECKING:
     from trajopt.curve import Curve

@@ -339,7 +339,7 @@ class FloatTwin:
         if not self.case.is_loaded(name):
             return 64 * EPS * self.magnitudes[DERIVATIVES.index(name)]
         assert self.case.inertia is not None
-        inertia = max(abs(value) for value in self.case.inertia.value)
+        inertia = float(max(abs(value) for value in self.case.inertia.value))
         force = inertia * self.magnitudes[2] + self.case.viscous * self.magnitudes[1] + self.case.coulomb
         force += sum(self.noise_along(spline) for spline in self.case.splines)
         if name in self.case.mixes:
@@ -355,7 +355,7 @@ class FloatTwin:
         if spline is self.case.force:
             return size
         lost = size / float(np.min(np.diff(spline.position)))
-        return (float(np.max(np.abs(slope))) + lost) * self.magnitudes[1] ** 2
+        return float((np.max(np.abs(slope)) + lost) * self.magnitudes[1] ** 2)
 
     # answers
 

@@ -1,6 +1,6 @@
 """The rational twin: the sums of the float twin without any rounding.
 
-What a load over position makes is left to the float twin: where the axis passes the knots of its splines is no fraction.
+What a load over position makes is left to the float twin: when the axis passes a knot of its splines is no fraction.
 """
 
 from __future__ import annotations

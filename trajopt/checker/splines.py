@@ -48,16 +48,12 @@ class Spline:
 
     def _weights(self, knots: Array) -> Array:
         """The weight of each basis function, from the rows of the table."""
-        from scipy.linalg import solve_banded
-
         count = len(self.position)
         index = self.stretch(self.position)
-        basis = _basis(knots, index, self.position)
-        band = np.zeros((2 * DEGREE + 1, count))
-        for shift in range(DEGREE + 1):
-            columns = index + shift
-            band[DEGREE + np.arange(count) - columns, columns] = basis[:, shift]
-        return np.asarray(solve_banded((DEGREE, DEGREE), band, self.value))
+        rows = np.zeros((count, 2 * DEGREE + 1))
+        first = index - np.arange(count) + DEGREE  # where the six columns of each row start, the diagonal at DEGREE
+        rows[np.arange(count)[:, None], first[:, None] + np.arange(DEGREE + 1)] = _basis(knots, index, self.position)
+        return _solved(rows, self.value.copy())
 
     def stretch(self, position: Array) -> NDArray[np.intp]:
         """The stretch in which each position lies; beyond the table the nearest."""
@@ -75,8 +71,8 @@ class Spline:
         return found
 
     def along(self, positions: Array, derivative: int = 0) -> Array:
-        """Coefficients of the value or the slope as polynomials of s, where the positions (pieces, n) are polynomials of
-        s that stay within one stretch each."""
+        """Coefficients of the value or the slope as polynomials of s, where the positions (pieces, n) are polynomials
+        of s that stay within one stretch each."""
         middle = positions @ (0.5 ** np.arange(positions.shape[1]))
         k = self.stretch(middle)
         width = self.breaks[k + 1] - self.breaks[k]
@@ -88,6 +84,23 @@ class Spline:
             found = product(found, u)
             found[:, 0] += column
         return found
+
+
+def _solved(rows: Array, found: Array) -> Array:
+    """The solution of a banded system, without pivots, which a totally positive matrix does not need; the diagonal is
+    column DEGREE of ``rows``. Changes both."""
+    count = len(found)
+    for k in range(count):
+        for i in range(k + 1, min(k + DEGREE + 1, count)):
+            share = rows[i, DEGREE - (i - k)] / rows[k, DEGREE]
+            if share:
+                rows[i, DEGREE - (i - k) : 2 * DEGREE + 1 - (i - k)] -= share * rows[k, DEGREE:]
+                found[i] -= share * found[k]
+    for k in range(count - 1, -1, -1):
+        reach = min(DEGREE, count - 1 - k)
+        known = rows[k, DEGREE + 1 : DEGREE + 1 + reach] @ found[k + 1 : k + 1 + reach]
+        found[k] = (found[k] - known) / rows[k, DEGREE]
+    return found
 
 
 def _basis(knots: Array, index: NDArray[np.intp], x: Array) -> Array:
