@@ -121,7 +121,8 @@ def _descend(cost: _Cost, start: Floats) -> Floats:
         return np.asarray(
             least_squares(cost.residual, start, cost.slope, method="lm", xtol=tight, ftol=tight, gtol=tight).x
         )
-    return np.asarray(minimize(lambda p: float(cost.each(p[:, None])[0]), start, method="BFGS").x)
+    value: Any = lambda p: float(cost.each(p[:, None])[0])  # noqa: E731
+    return np.asarray(minimize(value, start, method="BFGS").x)
 
 
 class _Cost:

@@ -66,6 +66,10 @@ class Columns:
             raise ValueError(f"{self.path}: {many}; its header is {header}")
         return self._scaled(found[0], kind, rotary)
 
+    def has(self, kind: str, rotary: bool) -> bool:
+        """Whether any column measures ``kind``."""
+        return any(_measures(unit, kind, rotary) for unit, _ in self.columns.values())
+
     def _scaled(self, name: str, kind: str, rotary: bool) -> NDArray[np.float64]:
         unit, values = self.columns[name]
         try:

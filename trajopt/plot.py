@@ -76,7 +76,7 @@ def plot(solution: Solution) -> Panels:
         _finish(axes, name, [trajectory])
     _mark_arcs(panels, solution.structure)
     _title(panels, solution.problem.title or "Trajectory", pad=18)
-    _note(panels[0], f"minimised {_pretty(objective_text(solution))}", "left", 8)
+    _note(panels[0], f"minimised {pretty(objective_text(solution))}", "left", 8)
     return panels
 
 
@@ -225,7 +225,7 @@ def _panels(names: list[str], trajectory: Trajectory) -> Panels:
     figure = Figure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained", facecolor="white")
     panels = Panels(figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0])
     for axes, name in zip(panels, names, strict=True):
-        axes.set_ylabel(f"{kinds[name].name}\n[{_pretty(kinds[name].unit)}]", fontsize=8)
+        axes.set_ylabel(f"{kinds[name].name}\n[{pretty(kinds[name].unit)}]", fontsize=8)
         axes.tick_params(labelsize=8, color=GREY)
         axes.spines[["top", "right"]].set_visible(False)
         axes.spines[["left", "bottom"]].set_color(GREY)
@@ -240,7 +240,7 @@ def _title(panels: Panels, text: str, pad: float) -> None:
     panels[0].set_title("\n".join(textwrap.wrap(text, 70)), loc="left", fontsize=11, fontweight="bold", pad=pad)
 
 
-def _pretty(unit: str) -> str:
+def pretty(unit: str) -> str:
     return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
 
 
@@ -269,7 +269,7 @@ def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(0.0, max(trajectory.duration for trajectory in trajectories))
     if far:
-        unit = _pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
+        unit = pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
         _note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
 
 

@@ -195,10 +195,10 @@ class Load(Section):
 
     ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, a Table over time
     (Remark 1), or a Curve over position, which adds ½ J'(q) v² (Van Oosterwyck et al. eq. 1). ``force``: the load's own
-    over position, N or N m, such as that of gravity. ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor see
-    `trajopt.motor`: ``torque_constant``
-    N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)² or (A rad/s)², ``hysteresis`` W per m/s
-    or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it feeds back can be used.
+    over position, N or N m, such as that of gravity. ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor
+    see `trajopt.motor`: ``torque_constant`` N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)²
+    or (A rad/s)², ``hysteresis`` W per m/s or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it
+    feeds back can be used.
     """
 
     inertia: Annotated[float | Table | Curve | None, BeforeValidator(_inertia)] = None

@@ -64,7 +64,8 @@ def read(result: Mapping[str, Any], notes: list[str]) -> Case | None:
         raise Malformed("nested too deeply") from None
 
 
-def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
+def stated(problem: Mapping[str, Any], notes: list[str]) -> dict[str, Any]:
+    """What a case takes from its problem alone. Raises Malformed."""
     _finite(problem, "problem")
     known = ("move", "limits", "load", "vibration", "objective", "transcription", "title", "source", "moral", "rotary")
     notes += [f"problem.{key}" for key in problem if key not in known]
@@ -75,8 +76,6 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
     mixes = _mixes(motor)
     limits = _limits(problem.get("limits", {}), mixes)
     terms = _terms(problem.get("objective"))
-    order = _order(move, limits, terms, grid.get("scheme"))
-    time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
     inertia, force = _inertia(load.get("inertia")), None
     if load.get("force") is not None:
         force = _spline(load["force"], "load.force")
@@ -88,21 +87,38 @@ def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[s
         raise Malformed("a limit or an objective of force or power needs load.inertia")
     if motor is None and named & {*ELECTRICAL, "brake_energy", "copper_loss", "electrical_energy"}:
         raise Malformed("a limit or an objective of the motor needs load.torque_constant and load.resistance")
+    return {
+        "limits": limits, "inertia": inertia, "force": force,
+        "coulomb": _nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
+        "viscous": _number(load.get("viscous", 0.0), "load.viscous"),
+        "motor": motor, "mixes": mixes, "dwell": _nonnegative(move.get("dwell", 0.0), "move.dwell"),
+        "terms": terms, "move_time": _move_time(move.get("time")),
+        "intervals": _whole(grid.get("intervals"), "intervals"),
+        "vibration": _vibration(problem.get("vibration", ())), "rotary": problem.get("rotary") is True,
+    }  # fmt: skip
+
+
+def ends(problem: Mapping[str, Any], order: int) -> tuple[dict[int, float], dict[int, float]]:
+    """The prescribed states at the start and at the end, by derivative."""
+    move = _mapping(problem.get("move"), "problem.move")
+    start = _state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0)
+    return start, _state(move.get("end"), "move.end", order, {}, 0.0)
+
+
+def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
+    parts = stated(problem, notes)
+    move, scheme = problem["move"], problem["transcription"].get("scheme")
+    order = _order(move, parts["limits"], parts["terms"], scheme)
+    time, signal = _trajectory(result["trajectory"], scheme, order, notes)
+    start, end = ends(problem, order)
     return Case(
-        scheme=grid["scheme"], order=order, time=time, signal=signal,
-        start=_state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0),
-        end=_state(move.get("end"), "move.end", order, {}, 0.0),
-        via=_via(move.get("via", ()), order), limits=limits, inertia=inertia, force=force,
-        coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
-        viscous=_number(load.get("viscous", 0.0), "load.viscous"),
-        motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
-        terms=terms, move_time=_move_time(move.get("time")), intervals=_whole(grid.get("intervals"), "intervals"),
+        scheme=scheme, order=order, time=time, signal=signal, start=start, end=end, **parts,
+        via=_via(move.get("via", ()), order),
         objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
         metrics={
             str(name): _number(value, f"metrics.{name}")
             for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
         },
-        vibration=_vibration(problem.get("vibration", ())), rotary=problem.get("rotary") is True,
         **_certificate(result.get("certificate")),
     )  # fmt: skip
 

@@ -1,0 +1,47 @@
+"""Figures of an identification: the load found over position, the torque left over, the residual of the friction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from trajopt import units
+from trajopt.plot import COLOURS, pretty
+from trajopt.plot_profiles import draw_load, quiet
+from trajopt.quantities import force_along
+from trajopt.signals import OnFloats
+
+if TYPE_CHECKING:
+    from trajopt.identification import Identified
+
+
+def plot_identification(found: Identified) -> list[Axes]:
+    """Two or three axes: inertia and load, what the torque of each motion exceeds the fit by, residual of friction."""
+    count = 2 + (found.friction is not None)
+    figure = Figure(figsize=(7.0, 2.8 * count), layout="constrained", facecolor="white")
+    panels: list[Axes] = list(figure.subplots(count, 1))
+    kinds = units.kinds(found.rotary)
+    unit = f"{kinds['force'].name} left over [{pretty(kinds['force'].unit)}]"
+    scale = draw_load(panels[0], found.fit.load, found.rotary)
+    panels[0].set_title("Identified load", loc="left", fontsize=11, fontweight="bold")
+    for k, motion in enumerate(found.motions):
+        q = np.asarray(motion.smooth(motion.time))
+        model = force_along(OnFloats(), found.fit.load, q, motion.velocity, motion.acceleration)
+        label = motion.name.rpartition("/")[2]
+        panels[1].plot(q * scale, motion.force - model, ".", ms=2.5, color=COLOURS[k % 7], label=label)
+    panels[1].set_xlabel(f"position [{'deg' if found.rotary else 'm'}]", fontsize=8)
+    panels[1].set_ylabel(unit, fontsize=8)
+    panels[1].legend(fontsize=8, frameon=False)
+    if found.friction is not None:
+        friction = found.friction
+        panels[2].plot(friction.time, friction.residual, ".", ms=2.5, color=COLOURS[0])
+        panels[2].set_xlabel("time [s]", fontsize=8)
+        panels[2].set_ylabel(unit, fontsize=8)
+        text = f"viscous friction {friction.viscous:.4g} ± {friction.error:.2g} {pretty(kinds['viscous'].unit)}"
+        panels[2].set_title(text, loc="left", fontsize=9)
+    for axes in panels:
+        quiet(axes)
+    return panels
