@@ -61,3 +61,23 @@ def load(step: float = 1.0, low: float = -10.0, high: float = 190.0, **more: flo
     ends = np.deg2rad(low), np.deg2rad(high)
     curves = (trajopt.Curve.of(function, *ends, count) for function in (inertia, load_torque))
     return trajopt.Load(**dict(zip(("inertia", "force"), curves, strict=True)), **more)
+
+
+def table(step: float = 1.0, low: float = -10.0, high: float = 190.0) -> str:
+    """The table `slider_crank.csv`, as a CAD system would export it."""
+    degrees = np.arange(low, high + step / 2, step)
+    angle = np.deg2rad(degrees)
+    rows = zip(degrees, inertia(angle), load_torque(angle), strict=True)
+    return "\n".join(["theta [deg],J [kg m^2],T [N m]", *(f"{q:g},{j:.17g},{t:.17g}" for q, j, t in rows)]) + "\n"
+
+
+def cycle_rms(forward: trajopt.Solution, back: trajopt.Solution) -> float:
+    """RMS torque of a cycle, N m: forwards, a dwell, back, a dwell, the crank held against gravity in both."""
+    square = length = 0.0
+    for solution in (forward, back):
+        assert solution.duration is not None and solution.problem.load.force is not None
+        dwell = solution.problem.move.dwell
+        held = float(solution.problem.load.force.at(solution.at(solution.duration)["position"]))
+        square += solution.metrics["rms_force"] ** 2 * solution.duration + held**2 * dwell
+        length += solution.duration + dwell
+    return float(np.sqrt(square / length))

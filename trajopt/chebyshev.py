@@ -100,13 +100,15 @@ def search(problem: Problem, family: Family) -> Floats:
 
 def search_box(problem: Problem, family: Family, seed: int = 1) -> Floats:
     """The same from differential evolution in the whole box, and a gradient search from the best of it."""
-    from scipy.optimize import differential_evolution
+    from scipy.optimize import Bounds, differential_evolution
 
     cost = _Cost(problem, family)
     if not family.free:
         return np.zeros(0)
+    each: Any = cost.each
+    low, high = zip(*family.box(), strict=True)
     found = differential_evolution(
-        cost.each, family.box(), rng=seed, vectorized=True, updating="deferred", polish=False, tol=1e-10, maxiter=600
+        each, Bounds(low, high), rng=seed, vectorized=True, updating="deferred", polish=False, tol=1e-10, maxiter=600
     )
     return _descend(cost, found.x)
 

@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 
 DEGREE: Final = 5
 LEAST: Final = DEGREE + 1  # rows
+ROUNDING: Final = 1e-9  # of its span
 _GAP: Final = 10.0  # times the usual step between rows
 
 
@@ -70,6 +71,17 @@ class Curve(Section):
     def span(self) -> tuple[float, float]:
         """The first and the last position."""
         return self.position[0], self.position[-1]
+
+    def around(self, places: list[float]) -> tuple[float, float]:
+        """The span, with places that are outside it by a rounding."""
+        low, high = self.span
+        near = [x for x in places if low - self.room <= x <= high + self.room]
+        return min([low, *near]), max([high, *near])
+
+    @property
+    def room(self) -> float:
+        """By how much a place may be outside the table and count as on its end."""
+        return ROUNDING * (self.span[1] - self.span[0])
 
     @property
     def lowest(self) -> float:

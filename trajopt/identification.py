@@ -1,9 +1,9 @@
 """Identification of a mechanism: inertia and load torque over position from motions, friction from a measured one.
 
 Torque is T = F(q) + ½ J'(q) v² + J(q) a (Van Oosterwyck et al. eq. 1): at one position [1, v²/2, a]·[F, J', J] = T, so
-that three motions through it (a slow one, one of constant speed, one that speeds up) give all three pointwise. Better is
-one smooth fit of all samples, in which J' is the slope of J. Velocity and acceleration come from a polynomial through the
-measured positions, whose degree the residual chooses: differences of samples would amplify their noise.
+that three motions through it (a slow one, one of constant speed, one that speeds up) give all three pointwise. Better
+is one smooth fit of all samples, in which J' is the slope of J. Velocity and acceleration come from a polynomial
+through the measured positions, whose degree the residual chooses: differences of samples would amplify their noise.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.polynomial import Chebyshev
+from numpy.polynomial import Chebyshev, chebyshev
 
 from trajopt import units
 from trajopt.columns import Columns
@@ -30,8 +30,8 @@ from trajopt.quantities import force_along
 from trajopt.signals import OnFloats
 
 _MOST: Final = 25  # degree of the polynomial through positions
-_STRETCHES: Final = (4, 6, 8, 12, 16, 24, 32, 48)  # of the splines of a joint fit
-_AGREE: Final = 1e-10  # of the signal: a residual this small is rounding
+_STRETCHES: Final = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)  # of the splines of a joint fit
+_ROUNDING: Final = 1e-14  # of the stroke: a residual this small says nothing more
 _SINGULAR: Final = 1e8  # condition of the three equations at a position
 
 
@@ -80,17 +80,21 @@ class Motion:
 
 def smoothed(time: Floats, position: Floats) -> Chebyshev:
     """The polynomial through noisy positions, of the degree that Bayes' criterion prefers for its residual."""
-    best, least, size = None, np.inf, float(np.ptp(position)) or 1.0
-    for degree in range(1, min(_MOST, len(time) // 3) + 1):
-        fit = Chebyshev.fit(time, position, degree)
-        residual = float(np.mean((fit(time) - position) ** 2))
-        score = _bayes(residual / size**2, len(time), degree + 1)
-        if score < least:
-            best, least = fit, score
-        if residual <= (_AGREE * size * 1e-3) ** 2:
+    best, least, size = 1, np.inf, float(np.ptp(position)) or 1.0
+    domain = [float(time[0]), float(time[-1])]
+    x = (2 * time - domain[0] - domain[1]) / (domain[1] - domain[0])
+    base, triangle = np.linalg.qr(chebyshev.chebvander(x, min(_MOST, len(time) // 3)))
+    shares, left = base.T @ position, position.copy()
+    for degree, share in enumerate(shares):
+        left = left - share * base[:, degree]
+        mean_square = float(np.mean(left**2)) / size**2
+        score = _bayes(mean_square, len(time), degree + 1)
+        if degree and score < least:
+            best, least = degree, score
+        if mean_square <= _ROUNDING**2:
             break
-    assert best is not None
-    return best
+    kept = slice(best + 1)
+    return Chebyshev(np.linalg.solve(triangle[kept, kept], shares[kept]), domain=domain)
 
 
 def _bayes(mean_square: float, samples: int, unknowns: int) -> float:
@@ -99,7 +103,7 @@ def _bayes(mean_square: float, samples: int, unknowns: int) -> float:
 
 @dataclass(frozen=True)
 class Friction:
-    """``viscous`` N s/m or N m s, its standard error, and the ``residual`` (n,) of the torque, N or N m, at ``time``."""
+    """``viscous`` N s/m or N m s, its standard error, and the ``residual`` (n,) of the torque at ``time``."""
 
     viscous: float
     error: float
@@ -209,6 +213,8 @@ def joint(motions: Sequence[Motion], rows: int = 181) -> Fit:
         score = _bayes((residual / size) ** 2, int(np.count_nonzero(inside)), unknowns)
         if best is None or score < best[0]:
             best = score, Fit(load, residual, stretches)
+        elif stretches > 2 * best[1].stretches:
+            break
     if best is None:
         raise BadInput("motions: do not determine inertia and load; record three of different speed and acceleration")
     return best[1]
@@ -219,6 +225,7 @@ def _fit(
 ) -> tuple[Load, float, int] | None:
     """The load, the RMS left over and the number of unknowns; None where they are not determined."""
     from scipy.interpolate import BSpline
+    from scipy.linalg import lstsq
 
     inner = np.linspace(*span, stretches + 1)
     knots = np.concatenate([np.full(DEGREE, span[0]), inner, np.full(DEGREE, span[1])])
@@ -229,7 +236,7 @@ def _fit(
     scale = np.linalg.norm(system, axis=0)
     if np.any(scale == 0):
         return None
-    found, _, rank, _ = np.linalg.lstsq(system / scale, torque, rcond=1e-12)
+    found, _, rank, _ = lstsq(system / scale, torque, cond=1e-12, lapack_driver="gelsy")
     if rank < 2 * count:
         return None
     left = system @ (found / scale) - torque

@@ -50,7 +50,8 @@ class Law:
         points, shares = gauss(_POINTS)
         places, weights = [], []
         for piece in self.pieces:
-            ends = np.linspace(*piece.domain, _PARTS + 1)
+            start, end = piece.domain
+            ends = np.linspace(start, end, _PARTS + 1)
             places.append((ends[:-1, None] + np.diff(ends)[:, None] * points).ravel())
             weights.append(np.outer(np.diff(ends), shares).ravel())
         return np.concatenate(places), np.concatenate(weights)

@@ -128,11 +128,10 @@ def _curves(problem: Problem) -> None:
         raise ValueError('transcription.scheme: a load over position needs "exact"')
     for name, curve in problem.load.curves.items():
         low, high = curve.span
-        room = CLAMPED * (high - low)
         origin = {} if problem.move.start_position is None else {"move.start.position": problem.move.start_position}
         given = {f"{where}.position": state.position for where, state in _states(problem)} | origin
         for where, place in given.items():
-            if isinstance(place, float) and not low - room <= place <= high + room:
+            if isinstance(place, float) and not low - curve.room <= place <= high + curve.room:
                 unit = kinds["position"].unit
                 raise ValueError(
                     f"load.{problem.shown(name)}: its table runs from {low:.6g} to {high:.6g} {unit}, too short for"

@@ -385,17 +385,16 @@ def _printable(text: str) -> str:
 OneLine = Annotated[str, AfterValidator(_printable)]
 
 
-def _within(limit: Limit | None, curve: Curve) -> Limit:
-    """A position limit that also keeps within the table of a curve."""
+def _within(limit: Limit | None, span: tuple[float, float]) -> Limit:
+    """A position limit that also keeps within a span."""
 
     def side(bound: float | Table | None, otherwise: float) -> float | Table:
         if isinstance(bound, Table):
-            return bound.model_copy(update={"value": tuple(np.clip(bound.value, *curve.span).tolist())})
-        return otherwise if bound is None else float(np.clip(bound, *curve.span))
+            return bound.model_copy(update={"value": tuple(np.clip(bound.value, *span).tolist())})
+        return otherwise if bound is None else float(np.clip(bound, *span))
 
-    low, high = curve.span
     limit = limit or Limit()
-    return Limit(min=side(limit.min, low), max=side(limit.max, high))
+    return Limit(min=side(limit.min, span[0]), max=side(limit.max, span[1]))
 
 
 class Problem(Section):
@@ -419,8 +418,11 @@ class Problem(Section):
     def _consistent(self) -> Self:
         from trajopt.preflight import refuse_contradictions
 
+        states = (self.move.start, self.move.end, *self.move.via)
+        places = [self.move.start_position, *(state.position for state in states)]
         for curve in self.load.curves.values():  # beyond its table the load is unknown
-            limits = self.limits.model_copy(update={"position": _within(self.limits.position, curve)})
+            span = curve.around([x for x in places if isinstance(x, float)])
+            limits = self.limits.model_copy(update={"position": _within(self.limits.position, span)})
             self.__dict__["limits"] = limits
         refuse_contradictions(self)
         return self

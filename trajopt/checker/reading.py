@@ -34,6 +34,7 @@ _MOTOR: Final = (
 )  # fmt: skip
 _LIMITED: Final = (*DERIVATIVES, *LOADED, *ELECTRICAL, *TOTALS)
 
+_ROUNDING: Final = 1e-9  # of its span: a table that ends so little before the move covers it
 _NUMBERS: Final = ("objective", "duration", "metrics", "trajectory")
 _REQUIRED: Final = ("format", "trajopt", "status", "problem_hash", "problem", *_NUMBERS)
 
@@ -214,7 +215,9 @@ def _spline(value: Any, where: str) -> Spline:
 def _within(spline: Spline, limits: Mapping[str, tuple[Curve | None, Curve | None]], scheme: Any) -> None:
     """A load over position is known within its table only, and between the nodes of the exact scheme."""
     low, high = limits.get("position", (None, None))
-    if low is None or high is None or min(low.value) < spline.position[0] or max(high.value) > spline.position[-1]:
+    first, last = float(spline.position[0]), float(spline.position[-1])
+    room = _ROUNDING * (last - first)
+    if low is None or high is None or min(low.value) < first - room or max(high.value) > last + room:
         raise Malformed("a load over position needs limits.position within its table")
     if scheme != "exact":
         raise Malformed("a load over position needs the exact scheme")
