@@ -1,4 +1,4 @@
-"""Chebyshev profiles: the rows of the reference, their bounds by linear programs, and the comparison with the best move."""
+"""Chebyshev profiles: the rows of the reference, bounds by linear programs, the comparison with the best move known."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def profiles() -> Profiles:
 
 def test_how_far_from_the_best_possible(profiles: Profiles) -> None:
     text = "\n".join(profiles.sentences())
-    assert "cheb9 10.0174145: 4.42 % above the best possible" in text
+    assert "cheb9 10.0174145: 4.42 % above the best known" in text
     assert "3 starts, of which 3 agree; no bound is known" in text
     assert [row.law.name for row in profiles.rows] == ["trapezoid 1/3", "poly5", "poly7J0", "cheb7", "cheb9"]
     assert {row.law.name: row.breaks for row in profiles.rows}["poly5"] == ("force",)

@@ -13,7 +13,7 @@ import norms
 import trajopt
 from problems import slider_crank
 from tests.conftest import solved, term
-from trajopt import checker
+from trajopt import checker, preflight
 from trajopt.attempt import Clock, nonconvex, to
 from trajopt.checker.splines import Spline
 from trajopt.rebuild import rebuild
@@ -60,8 +60,8 @@ def test_the_mechanism_is_that_of_the_reference() -> None:
 
 def test_a_table_a_degree_apart_gives_the_curve_and_its_slope() -> None:
     load, at = slider_crank.load(), np.linspace(0.0, slider_crank.TURN, 1001)
-    for curve, truth in ((load.curves["inertia"], slider_crank.inertia), (load.curves["force"], slider_crank.load_torque)):
-        np.testing.assert_allclose(curve.at(at), truth(at), atol=1e-12)
+    np.testing.assert_allclose(load.curves["inertia"].at(at), slider_crank.inertia(at), atol=1e-12)
+    np.testing.assert_allclose(load.curves["force"].at(at), slider_crank.load_torque(at), atol=1e-12)
     np.testing.assert_allclose(load.curves["inertia"].at(at, 1), slider_crank.inertia_slope(at), atol=1e-11)
     ready = trajopt.load("slider_crank")
     assert isinstance(ready, trajopt.Problem) and len(ready.load.curves) == 2
@@ -102,7 +102,8 @@ def test_its_torque_is_equation_1(free_profile: trajopt.Solution) -> None:
     np.testing.assert_allclose(frame["force"], torque, atol=1e-8)
     np.testing.assert_allclose(frame["power"], torque * v, atol=1e-6)
     energy = np.trapezoid(frame["power"], frame["time"])  # without friction: what gravity has stored
-    lifted = np.trapezoid(slider_crank.load_torque(np.linspace(0, slider_crank.TURN, 20_001)), dx=slider_crank.TURN / 2e4)
+    along = np.linspace(0.0, slider_crank.TURN, 20_001)
+    lifted = np.trapezoid(slider_crank.load_torque(along), along)
     assert energy == pytest.approx(lifted, rel=1e-3)
 
 
@@ -195,9 +196,8 @@ def test_without_an_acceleration_the_order_is_two_and_costs_more() -> None:
 
 def test_an_end_condition_on_acceleration_alone_is_void(free_profile: trajopt.Solution) -> None:
     """The same infimum, reached as O(h)."""
-    above = [
-        solved(crank(intervals=n, acceleration=None, jerk=1e12)).metrics["rms_force"] / FREE_PROFILE - 1 for n in (30, 60)
-    ]
+    held = [solved(crank(intervals=n, acceleration=None, jerk=1e12)).metrics["rms_force"] for n in (30, 60)]
+    above = [rms / FREE_PROFILE - 1 for rms in held]
     assert 0 < above[1] < 0.7 * above[0]
 
 
@@ -249,7 +249,8 @@ def test_the_checker_measures_what_scipy_integrates(free_profile: trajopt.Soluti
     def torque(t: float) -> float:
         x = free_profile.at(t)
         q, v, a = (x[name] for name in ("position", "velocity", "acceleration"))
-        return float(slider_crank.load_torque(q) + slider_crank.inertia_slope(q) * v**2 / 2 + slider_crank.inertia(q) * a)
+        turning = slider_crank.inertia_slope(q) * v**2 / 2 + slider_crank.inertia(q) * a
+        return float(slider_crank.load_torque(q) + turning)
 
     time, measured = free_profile.frame["time"].to_numpy(), checker.measure(free_profile.to_dict())
     square = sum(quad(lambda t: torque(t) ** 2, a, b)[0] for a, b in zip(time[:-1:4], time[4::4], strict=True))
@@ -260,8 +261,8 @@ def test_a_linear_axis_has_a_mass_over_position_too() -> None:
     mass = trajopt.Curve.of(lambda x: 4 + np.cos(3 * x), -0.1, 1.1, 100)
     problem = trajopt.Problem(
         move=trajopt.Move(time=1.0, end=trajopt.State(position=1.0)), load=trajopt.Load(inertia=mass, viscous=0.5),
-        objective=trajopt.Objective(terms=(term("energy"), term("jerk", norms.L2(), 1e-4))), limits=trajopt.Limits(jerk=500.0),
-        transcription=trajopt.Transcription(intervals=30),
+        objective=trajopt.Objective(terms=(term("energy"), term("jerk", norms.L2(), 1e-4))),
+        limits=trajopt.Limits(jerk=500.0), transcription=trajopt.Transcription(intervals=30),
     )  # fmt: skip
     assert solved(problem).audit["passed"]
 
@@ -271,3 +272,19 @@ def test_a_constant_curve_is_a_constant() -> None:
     curve = {"inertia": trajopt.Curve.of(lambda q: 0.005 + 0 * q, -1.0, 4.0)}
     plain, along = (solved(crank(load=trajopt.Load(**load), intervals=40)) for load in (constant, curve))
     assert along.metrics["rms_force"] == pytest.approx(plain.metrics["rms_force"], rel=1e-5)
+
+
+def test_degrees_taken_for_radians_are_warned_of() -> None:
+    slip = trajopt.Load(inertia=trajopt.Curve.of(lambda q: 0.005 + 0 * q, 0.0, 173.0))
+    (warning,) = preflight.warnings(crank(load=slip))
+    assert "57 times the move; degrees taken for radians?" in warning
+    assert preflight.warnings(crank()) == []
+
+
+def test_the_table_is_a_position_limit_and_goes_into_the_hash() -> None:
+    problem, narrow = crank(), crank(position=(-0.05, 4.0))
+    low, high = problem.load.curves["inertia"].span
+    assert problem.limits.position == trajopt.Limit(min=low, max=high)
+    assert narrow.limits.position == trajopt.Limit(min=-0.05, max=high)
+    assert trajopt.Problem.model_validate(problem.canonical()) == problem
+    assert problem.hash != crank(load=slider_crank.load(step=0.5)).hash

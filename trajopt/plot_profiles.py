@@ -40,7 +40,7 @@ def draw_load(axes: Axes, load: Load, rotary: bool) -> float:
         label = kinds[name].name if name == "inertia" else f"load {kinds[name].name}"
         drawn += here.plot(at * scale, along.at(at), color=COLOURS[k], linestyle=_STYLES[k], linewidth=1.6, label=label)
         here.set_ylabel(f"{label} [{pretty(kinds[name].unit)}]", fontsize=8)
-        quiet(here)
+        quiet(here, grid=k == 0)
     axes.set_xlabel(f"position [{unit}]", fontsize=8)
     axes.legend(handles=drawn, fontsize=8, frameon=False, loc="best")
     return scale
@@ -70,7 +70,7 @@ def _forces(axes: Axes, profiles: Profiles) -> None:
         axes.plot(time, force, color=COLOURS[k % 6], linestyle=style, linewidth=1.3, label=row.law.name)
     if profiles.best.trajectory is not None:
         seconds, values = curve(profiles.best.trajectory, "force")
-        axes.plot(seconds * 1e3, values, color=COLOURS[6], linewidth=1.8, label="best possible")
+        axes.plot(seconds * 1e3, values, color=COLOURS[6], linewidth=1.8, label="best known")
     axes.set_ylabel(f"{kind.name} [{pretty(kind.unit)}]", fontsize=8)
     axes.set_xlabel("time [ms]", fontsize=8)
     quiet(axes)
@@ -88,15 +88,20 @@ def _costs(axes: Axes, profiles: Profiles) -> None:
     axes.bar_label(bars, labels=labels, padding=2, fontsize=7)
     if profiles.best.objective is not None:
         line: Any = axes.axhline(profiles.best.objective, color=COLOURS[1], linewidth=1.2, linestyle=(0, (6, 3)))
-        line.set_label(f"best possible {profiles.best.objective:.5g}")
+        line.set_label(f"best known {profiles.best.objective:.5g}")
         axes.legend(fontsize=8, frameon=False, loc="upper right")
     axes.margins(y=0.2)
-    axes.set_ylabel(objective_label(profiles.best), fontsize=8)
+    (term, *others), kinds = profiles.problem.objective.terms, units.kinds(profiles.problem.rotary)
+    pure = not others and (term.norm is None or term.norm.name in ("l2", "linf"))
+    unit = f" [{pretty(kinds[term.minimize].unit)}]" if pure else ""
+    axes.set_ylabel(objective_label(profiles.best) + unit, fontsize=8)
     quiet(axes)
 
 
-def quiet(axes: Axes) -> None:
+def quiet(axes: Axes, grid: bool = True) -> None:
+    """The look of the house, with a grid behind the curves."""
     axes.tick_params(labelsize=8, color=GREY)
     axes.spines["top"].set_visible(False)
-    axes.grid(color="0.92", linewidth=0.7)
+    if grid:
+        axes.grid(color="0.92", linewidth=0.7)
     axes.set_axisbelow(True)

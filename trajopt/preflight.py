@@ -37,7 +37,7 @@ def warnings(problem: Problem | PlantProblem) -> list[str]:
     plain numbers of a plant give none away."""
     if not isinstance(problem, Problem):
         return []
-    return [*_clamped(problem), *_wrong_units(problem), *_coarse(problem), *_heavy(problem)]
+    return [*_clamped(problem), *_wrong_units(problem), *_degrees(problem), *_coarse(problem), *_heavy(problem)]
 
 
 def _clamped(problem: Problem) -> list[str]:
@@ -285,6 +285,19 @@ def _wrong_units(problem: Problem) -> list[str]:
             found.append(
                 f"limits.{name}: makes the least time {_span(least)}, against {_span(scale)}"
                 f" {'of move.time' if duration is not None else 'by the other limits'}; unit mistake?"
+            )
+    return found
+
+
+def _degrees(problem: Problem) -> list[str]:
+    """Tables over angles of many turns, where the move takes a small part of one."""
+    stroke, found = _stroke(problem), []
+    for name, curve in problem.load.curves.items():
+        span = curve.span[1] - curve.span[0]
+        if problem.rotary and 0 < stroke < 2 * math.pi < 30 * stroke < span:
+            found.append(
+                f"load.{problem.shown(name)}: its table spans {span:g} rad, {span / stroke:.0f} times the move; degrees"
+                " taken for radians?"
             )
     return found
 

@@ -1,7 +1,7 @@
-"""Profiles compared: those that drives offer, Chebyshev profiles, and the best possible move by transcription.
+"""Profiles compared: those that drives offer, Chebyshev profiles, and the best possible move, by transcription.
 
-The best possible one has end conditions on position and velocity alone, and keeps the problem's limits. It is a local
-optimum: the best of several starts, and nothing is claimed beyond that.
+The free profile has end conditions on position and velocity alone, and keeps the problem's limits. It is the best of
+local optima from several starts, "the best known", and nothing is claimed beyond that.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Profiles:
-    """The laws, dearest first as asked for, and the best possible move; `audit` is the report of the checker."""
+    """The laws as asked for, and the best move known; ``audit`` is the report of the checker."""
 
     problem: Problem
     rows: tuple[Row, ...]
@@ -48,7 +48,7 @@ class Profiles:
     audit: dict[str, Any] = field(default_factory=dict)
 
     def above(self, row: Row) -> float | None:
-        """By what share a law costs more than the best possible move; None where that was not found."""
+        """By what share a law costs more than the best move known; None where that was not found."""
         return None if not self.best.objective else row.objective / self.best.objective - 1
 
     def to_dict(self) -> dict[str, Any]:
@@ -66,25 +66,25 @@ class Profiles:
         }  # fmt: skip
 
     def sentences(self) -> list[str]:
-        """What there is to say, a line a law, and what the best possible move is."""
+        """What there is to say, a line a law, and what is known of the best move."""
         shown, lines = self.problem.shown, []
         for row in self.rows:
             above, breaks = self.above(row), " and ".join(shown(name) for name in row.breaks)
             text = f"{row.law.name} {row.objective:.9g}"
-            text += "" if above is None else f": {_percent(above)} the best possible"
+            text += "" if above is None else f": {_percent(above)} the best known"
             lines.append(text + (f", but breaks the {breaks} limit" if breaks else ""))
         return [*lines, self.best_text()]
 
     def best_text(self) -> str:
-        """What is known of the best possible move."""
+        """Where the best move known comes from."""
         best = self.best
         if best.objective is None:
-            return f"best possible: not found ({best.message or best.status.advice})"
+            return f"best known: none found ({best.message or best.status.advice})"
         proof, count = best.certificate, best.problem.transcription.intervals
         known = f"the best of {proof['starts']} starts, of which {proof['agreed']} agree; no bound is known"
         if proof.get("lower_bound") is not None:
             known = f"lower bound {proof['lower_bound']:.9g}"
-        return f"best possible {best.objective:.9g}: a free profile on {count} intervals, {known}"
+        return f"best known {best.objective:.9g}: a free profile on {count} intervals, {known}"
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write profiles.json, a table of set-points a Chebyshev profile, pictures, and the best move into best/."""
