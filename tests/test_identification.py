@@ -10,7 +10,8 @@ import pytest
 
 import trajopt
 from problems import slider_crank
-from trajopt.identification import Motion, friction_of, identify, joint, pointwise
+from trajopt.identification import friction_of, identify, joint, pointwise
+from trajopt.motions import Motion
 
 STROKE = np.deg2rad(175.0)
 AT = np.linspace(*np.deg2rad([1.0, 174.0]), 300)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
@@ -11,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 import pyomo.environ as pyo
 
+from trajopt.along import Along, curved
 from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
 from trajopt.model import Claim, Floats, Outcome, Prices, own_size
@@ -47,7 +47,7 @@ class NonconvexModel:
         self._vectors: list[tuple[Any, Any, float]] = []
         self._named: list[tuple[str, list[Any], float, Floats, Floats]] = []
         self._contradiction = ""
-        self._curves: list[_Along] = []
+        self._curves: list[Along] = []
 
     def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
         def bounds(_: Any, k: int) -> tuple[float | None, float | None]:
@@ -136,8 +136,8 @@ class NonconvexModel:
     def along(self, position: Any, wanted: list[tuple[Curve, int]]) -> list[Any]:
         """Variables for derivatives of curves at positions, which Ipopt sees with their exact derivatives.
 
-        A spline has no expression without branches, so the rows ``value - curve(position) = 0`` go to the solver as
-        ``value - position = 0`` and are put right by `_curved`. Positions keep within the tables, or a little beyond.
+        The rows ``value - curve(position) = 0`` are written as ``value - position = 0``, and put right by
+        `trajopt.along.curved`. Positions keep within the tables, or a little beyond.
         """
         low, high = max(c.span[0] for c, _ in wanted), min(c.span[1] for c, _ in wanted)
         reach = (high - low) * _BEYOND
@@ -149,7 +149,7 @@ class NonconvexModel:
             size = float(np.max(np.abs(curve.at(np.array(curve.position), order)))) or 1.0
             y = self.vector(count, size, np.full(count, -np.inf), np.full(count, np.inf))
             rows = [self._row(row, 1.0, equality=True) for row in y * (1 / size) - x * (1 / span)]
-            self._curves.append(_Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], rows))
+            self._curves.append(Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], rows))
             found.append(y)
         return found
 
@@ -183,7 +183,7 @@ class NonconvexModel:
         if self._contradiction:
             return Outcome(Claim.FAILED, self._contradiction)
         for along in self._curves:
-            along.start()
+            along.start(self.value(along.position))
         nlp, problem, deadline = _interface(self._model, self._curves, seconds)
         for option, setting in _OPTIONS.items():
             problem.add_option(option, setting)
@@ -231,78 +231,7 @@ class _Deadline:
         return not self.passed
 
 
-@dataclass(frozen=True)
-class _Along:
-    """A derivative of a curve at positions: the expressions of these, their variables and those of the values, each
-    with its size, and the rows that say so."""
-
-    curve: Curve
-    order: int
-    position: Any
-    x: tuple[Any, Any, float]
-    y: tuple[Any, Any, float]
-    rows: list[Any]
-
-    def start(self) -> None:
-        """Have Ipopt start where the positions are, and at the values there."""
-        (_, places, span), (_, values, size) = self.x, self.y
-        at = np.array([float(pyo.value(q)) for q in self.position])
-        for k, (q, value) in enumerate(zip(at, self.curve.at(at, self.order), strict=True)):
-            low, high = places[k].bounds
-            places[k].set_value(min(max(q / span, low), high))
-            values[k].set_value(float(value) / size)
-
-    def indices(self, nlp: Any) -> tuple[Any, Any]:
-        """The numbers of the rows and of the variables of the positions."""
-        places = self.x[1]
-        rows = nlp.get_constraint_indices(self.rows)
-        return np.array(rows), np.array(nlp.get_primal_indices([places[k] for k in range(len(self.rows))]))
-
-    def scaled(self, x: Floats, more: int = 0) -> Floats:
-        """The curve, or a derivative of it, as the rows have it."""
-        span, size = self.x[2], self.y[2]
-        return self.curve.at(x * span, self.order + more) * (span**more / size)
-
-
-def _curved(base: Any) -> Any:
-    """A class of programs, derived from PyNumero's, in whose rows curves take the place of straight lines."""
-    from scipy.sparse import coo_matrix
-
-    class CurvedNLP(base):  # type: ignore[misc]
-        def __init__(self, model: Any, curves: list[_Along]) -> None:
-            super().__init__(model)
-            self._along = [(along, *along.indices(self)) for along in curves]
-            self._in_rows = np.concatenate([rows for _, rows, _ in self._along])
-            self._in_columns = np.concatenate([columns for _, _, columns in self._along])
-
-        def _values(self, more: int) -> Floats:
-            x = self.get_primals()
-            return np.concatenate([along.scaled(x[columns], more) for along, _, columns in self._along])
-
-        def evaluate_constraints(self, out: Any = None) -> Any:
-            found = super().evaluate_constraints(out)
-            np.add.at(found, self._in_rows, self.get_primals()[self._in_columns] - self._values(0))
-            return found
-
-        def evaluate_jacobian(self, out: Any = None) -> Any:
-            return self._joined(super().evaluate_jacobian(), self._in_rows, 1 - self._values(1), out)
-
-        def evaluate_hessian_lag(self, out: Any = None) -> Any:
-            bent = -self.get_duals()[self._in_rows] * self._values(2)
-            return self._joined(super().evaluate_hessian_lag(), self._in_columns, bent, out)
-
-        def _joined(self, found: Any, rows: Any, values: Floats, out: Any) -> Any:
-            data = np.concatenate([found.data, values])
-            if out is not None:
-                np.copyto(out.data, data)
-                return out
-            places = (np.concatenate([found.row, rows]), np.concatenate([found.col, self._in_columns]))
-            return coo_matrix((data, places), shape=found.shape)
-
-    return CurvedNLP
-
-
-def _interface(model: Any, curves: list[_Along], seconds: float | None) -> tuple[Any, Any, _Deadline]:
+def _interface(model: Any, curves: list[Along], seconds: float | None) -> tuple[Any, Any, _Deadline]:
     from pyomo.contrib.pynumero.asl import AmplInterface
 
     library = Path(sys.prefix) / "lib" / "libpynumero_ASL.so"
@@ -312,7 +241,7 @@ def _interface(model: Any, curves: list[_Along], seconds: float | None) -> tuple
         from pyomo.contrib.pynumero.interfaces.cyipopt_interface import CyIpoptNLP
         from pyomo.contrib.pynumero.interfaces.pyomo_nlp import PyomoNLP
 
-        nlp = _curved(PyomoNLP)(model, curves) if curves else PyomoNLP(model)
+        nlp = curved(PyomoNLP)(model, curves) if curves else PyomoNLP(model)
         deadline = _Deadline(seconds)
         return nlp, CyIpoptNLP(nlp, intermediate_callback=deadline), deadline
     except (ImportError, RuntimeError) as error:
