@@ -15,6 +15,7 @@ from scipy.optimize import linprog
 
 import trajopt
 from problems import slider_crank
+from tests.test_cli import run
 from tests.test_mechanism import crank
 from trajopt import checker
 from trajopt.chebyshev import Family, bound, search, search_box
@@ -137,3 +138,14 @@ def test_what_no_profile_fits_is_refused(change: Any, words: tuple[str, ...]) ->
         change()
     assert all(word in str(refused.value) for word in words), str(refused.value)
     assert slider_crank.TURN > 3
+
+
+def test_the_command_says_how_far_from_the_best_and_writes_what_can_be_checked(tmp_path: Path) -> None:
+    done = run("profiles", "slider_crank", "--degree", "7", "--set", "transcription.intervals=20", "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "cheb7 11.2708331: 17.5 % above the best known" in done.stdout
+    assert run("check", tmp_path / "out" / "profiles.json").returncode == 0
+    assert run("check", tmp_path / "out" / "best" / "result.json").returncode == 0
+    for words, word in ((["--degree", "4"], "degree: 4"), (["--ends", "XX"], "ends: must be JF")):
+        refused = run("profiles", "slider_crank", *words)
+        assert refused.returncode == 2 and word in refused.stderr and refused.stderr.count("\n") == 1

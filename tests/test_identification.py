@@ -10,6 +10,7 @@ import pytest
 
 import trajopt
 from problems import slider_crank
+from tests.test_cli import run
 from trajopt.identification import friction_of, identify, joint, pointwise
 from trajopt.motions import Motion
 
@@ -138,3 +139,16 @@ def test_what_determines_nothing_is_refused(attempt: Any, words: tuple[str, ...]
     with pytest.raises(trajopt.BadInput) as refused:
         attempt()
     assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_the_command_writes_a_load_and_says_its_friction(tmp_path: Path) -> None:
+    motions = written(tmp_path, three(count=400))
+    speed = motions[1].read_text().splitlines()
+    rubbing = [",".join([*row.split(",")[:2], f"{float(row.split(',')[2]) + 0.5:.17g}"]) for row in speed[1:]]
+    measured = tmp_path / "measured.csv"
+    measured.write_text("\n".join([speed[0], *rubbing]) + "\n")
+    done = run("identify", *motions, "--friction", measured, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "viscous friction 0.025 " in done.stdout and (tmp_path / "out" / "load.csv").exists()
+    refused = run("identify", tmp_path / "none.csv")
+    assert refused.returncode == 2 and "cannot be read" in refused.stderr and refused.stderr.count("\n") == 1

@@ -31,10 +31,10 @@ def plot_identification(found: Identified) -> list[Axes]:
         q = np.asarray(motion.smooth(motion.time))
         model = force_along(OnFloats(), found.fit.load, q, motion.velocity, motion.acceleration)
         label = motion.name.rpartition("/")[2]
-        panels[1].plot(q * scale, motion.force - model, ".", ms=2.5, color=COLOURS[k % 7], label=label)
+        panels[1].plot(q * scale, motion.force - model, ".", ms=1.5, color=COLOURS[k % 7], label=label)
     panels[1].set_xlabel(f"position [{'deg' if found.rotary else 'm'}]", fontsize=8)
     panels[1].set_ylabel(unit, fontsize=8)
-    panels[1].legend(fontsize=8, frameon=False)
+    panels[1].legend(fontsize=8, frameon=False, markerscale=4, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     if found.friction is not None:
         friction = found.friction
         panels[2].plot(friction.time, friction.residual, ".", ms=2.5, color=COLOURS[0])

@@ -62,7 +62,8 @@ class Profiles:
         best |= {"problem_hash": self.best.problem.hash, "certificate": dict(self.best.certificate) or None}
         problem = self.problem
         return {
-            "format": FORMAT, "problem_hash": problem.hash, "problem": problem.canonical(), "laws": laws, "best": best,
+            "format": FORMAT, "status": self.best.status.value, "problem_hash": problem.hash,
+            "problem": problem.canonical(), "laws": laws, "best": best,
         }  # fmt: skip
 
     def sentences(self) -> list[str]:
