@@ -141,7 +141,8 @@ def test_what_no_profile_fits_is_refused(change: Any, words: tuple[str, ...]) ->
 
 
 def test_the_command_says_how_far_from_the_best_and_writes_what_can_be_checked(tmp_path: Path) -> None:
-    done = run("profiles", "slider_crank", "--degree", "7", "--set", "transcription.intervals=20", "-o", tmp_path / "out")
+    coarse = ("--set", "transcription.intervals=20")
+    done = run("profiles", "slider_crank", "--degree", "7", *coarse, "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "cheb7 11.2708331: 17.5 % above the best known" in done.stdout
     assert run("check", tmp_path / "out" / "profiles.json").returncode == 0
