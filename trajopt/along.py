@@ -1,8 +1,8 @@
 """Curves over position in a nonlinear program: rows that PyNumero evaluates with exact derivatives.
 
 A spline has no expression without branches. Pyomo is given straight lines in its place, and the program that Ipopt sees
-is put right here: values, Jacobian and Hessian. Against Chebyshev polynomials of the same accuracy as expressions it is
-quicker by far, and it takes any table.
+is put right here: values, Jacobian and Hessian. So any table will do, and the rows stay few: a polynomial of the same
+accuracy would be an expression of dozens of terms at every sample.
 """
 
 from __future__ import annotations
