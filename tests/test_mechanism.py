@@ -16,7 +16,9 @@ from tests.conftest import solved, term
 from trajopt import checker, preflight
 from trajopt.attempt import Clock, nonconvex, to
 from trajopt.checker.splines import Spline
+from trajopt.metrics import metrics
 from trajopt.rebuild import rebuild
+from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
 
 FREE_PROFILE = 9.593082  # N m RMS, of the reference
@@ -288,3 +290,37 @@ def test_the_table_is_a_position_limit_and_goes_into_the_hash() -> None:
     assert narrow.limits.position == trajopt.Limit(min=-0.05, max=high)
     assert trajopt.Problem.model_validate(problem.canonical()) == problem
     assert problem.hash != crank(load=slider_crank.load(step=0.5)).hash
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_metrics_and_checker_agree_on_moves_that_nobody_optimised(seed: int) -> None:
+    """Smooth random moves of order 2 to 4, forwards and back, with friction and a motor: every number but those of
+    limits and ends is found again."""
+    rng = np.random.default_rng(seed)
+    order, duration, count = 2 + seed % 3, 0.08, int(rng.integers(6, 40))
+    load = slider_crank.load(
+        step=float(rng.choice([0.5, 2.0, 8.0])), viscous=0.02, coulomb=0.3 * (seed % 2), torque_constant=1.1,
+        resistance=0.4, switching=0.5, recovery=0.5,
+    )  # fmt: skip
+    name, norm = [("force", "l2"), ("power", "l1"), ("energy", None), ("electrical_energy", None)][seed % 4]
+    limit = {2: {}, 3: {"jerk": 1e9}, 4: {"snap": 1e12}}[order]
+    problem = crank(name, norm, intervals=count, load=load, time=duration, acceleration=None, **limit)
+    setting = Setting.of(problem)
+    s = (np.arange(count) + 0.5) / count
+    wave = 1.5 * np.sin(2 * np.pi * s) + rng.standard_normal() * np.sin(4 * np.pi * s)
+    top = wave * 3 / duration**order * (2 * np.pi) ** (order - 2)
+    chain = setting.scheme.rollout(np.array([1.0, *np.zeros(order - 1)]), top, setting.mesh.steps * duration)
+    low, high = min(chain[0]), max(chain[0])
+    scale = min(1.0, 1.9 / (high - low))
+    chain = [x * scale for x in chain]
+    chain[0] = chain[0] - min(chain[0]) + 0.3
+    trajectory = Trajectory(problem, setting.mesh, setting.scheme, setting.sizes, duration, 0.0, tuple(chain))
+    found = metrics(trajectory)
+    solution = trajopt.Solution(
+        trajopt.Verdict.SOLVED_LOCAL, problem, trajopt.route(problem), trajectory.measure(problem.objective), duration,
+        found, {"lower_bound": None, "gap": None}, trajectory=trajectory,
+    )  # fmt: skip
+    for strict in (False, True):
+        failed = checker.check(solution.to_dict(), strict=strict).failed
+        wrong = [str(check) for check in failed if not check.name.startswith(("limit", "start", "end"))]
+        assert not wrong, wrong

@@ -172,27 +172,29 @@ class Quantities:
             return found
         position, velocity, acceleration = (self.signal(name) for name in DERIVATIVES[:3])
         if isinstance(self.model, BetweenReversals):
-            values = [
-                self._at(*(x.within(self.model, s) for x in (position, velocity, acceleration))) for s in _FITTED
-            ]
-            return signals.fitted(values, _FITTED)
+            at = [[x.within(self.model, s) for x in (position, velocity, acceleration)] for s in _FITTED]
+            force = signals.fitted([self._smooth(q, v, a) for q, v, a in at], _FITTED)
+            coulomb = self.problem.load.coulomb
+            return signals.plus(self.model, force, self._coulomb(velocity)) if coulomb else force
         jumps = acceleration.nodes is None
         inner = Signal(acceleration.nodes, (), LOBATTO if jumps else LOBATTO[1:-1])
         where = zip(*(x.where(self.model, inner) for x in (position, velocity, acceleration)), strict=True)
-        force = signals.sampled([self._at(q, v, a) for q, v, a in where], inner)
+        force = signals.sampled([self._smooth(q, v, a) + self._rubbing(v) for q, v, a in where], inner)
         if not isinstance(self.model, OnFloats):  # its variables join the model once
             self.model.kept_force = force
         return force
 
-    def _at(self, position: Any, velocity: Any, acceleration: Any) -> Any:
-        """The force at vectors of displacement, velocity and acceleration."""
-        problem, load = self.problem, self.problem.load
-        friction = 0.0
-        if load.coulomb:
-            way = problem.one_way
-            friction = load.coulomb * (way or self.model.signs(Signal(velocity, ()), self.sizes.derivative[1])[0])
-        position = position + (problem.move.start_position or 0.0)
-        return force_along(self.model, load, position, velocity, acceleration) + friction
+    def _smooth(self, displacement: Any, velocity: Any, acceleration: Any) -> Any:
+        """The force at vectors of samples, but for Coulomb friction."""
+        position = displacement + (self.problem.move.start_position or 0.0)
+        return force_along(self.model, self.problem.load, position, velocity, acceleration)
+
+    def _rubbing(self, velocity: Any) -> Any:
+        """Coulomb friction at a vector of velocities."""
+        coulomb, way = self.problem.load.coulomb, self.problem.one_way
+        if not coulomb:
+            return 0.0
+        return coulomb * (way or self.model.signs(Signal(velocity, ()), self.sizes.derivative[1])[0])
 
     def holding(self) -> Any:
         """The force that holds a load over position at the end of the move."""

@@ -200,7 +200,9 @@ class FloatTwin:
             return product(self.polynomial("force", at_rest)[0], velocity)
         if name != "force":
             a, b = map(float, self.case.mixes[name])
-            return a * self.polynomial("force", at_rest)[0] + b * velocity
+            found = a * self.polynomial("force", at_rest)[0]
+            found[:, : velocity.shape[1]] += b * velocity
+            return found
         inertia, acceleration = self.case.inertia, self.rows(2, self.one_way)
         if self.case.splines:
             force = self.rows_along(velocity, acceleration)
