@@ -25,9 +25,9 @@ FREE_PROFILE = 9.593082  # N m RMS, of the reference
 
 
 def crank(minimize: Any = "force", norm: Any = "l2", *, intervals: int = 40, load: Any = None, **more: Any) -> Any:
-    """The crank's move with free accelerations at its ends; ``more`` goes to limits, but for time and ends."""
+    """The crank's move with free accelerations at its ends; ``more`` goes to limits, but for time, places and ``ends``."""
     terms = minimize if isinstance(minimize, list) else [term(minimize, norm)]
-    free = {"acceleration": more.pop("acceleration", "free")}
+    free = {"acceleration": more.pop("ends", "free")}
     return trajopt.Problem(
         move=trajopt.Move(
             time=more.pop("time", slider_crank.DURATION),
@@ -198,7 +198,7 @@ def test_without_an_acceleration_the_order_is_two_and_costs_more() -> None:
 
 def test_an_end_condition_on_acceleration_alone_is_void(free_profile: trajopt.Solution) -> None:
     """The same infimum, reached as O(h)."""
-    held = [solved(crank(intervals=n, acceleration=None, jerk=1e12)).metrics["rms_force"] for n in (30, 60)]
+    held = [solved(crank(intervals=n, ends=None, jerk=1e12)).metrics["rms_force"] for n in (30, 60)]
     above = [rms / FREE_PROFILE - 1 for rms in held]
     assert 0 < above[1] < 0.7 * above[0]
 
@@ -304,7 +304,7 @@ def test_metrics_and_checker_agree_on_moves_that_nobody_optimised(seed: int) -> 
     )  # fmt: skip
     name, norm = [("force", "l2"), ("power", "l1"), ("energy", None), ("electrical_energy", None)][seed % 4]
     limit = {2: {}, 3: {"jerk": 1e9}, 4: {"snap": 1e12}}[order]
-    problem = crank(name, norm, intervals=count, load=load, time=duration, acceleration=None, **limit)
+    problem = crank(name, norm, intervals=count, load=load, time=duration, ends=None, **limit)
     setting = Setting.of(problem)
     s = (np.arange(count) + 0.5) / count
     wave = 1.5 * np.sin(2 * np.pi * s) + rng.standard_normal() * np.sin(4 * np.pi * s)
