@@ -25,7 +25,7 @@ FREE_PROFILE = 9.593082  # N m RMS, of the reference
 
 
 def crank(minimize: Any = "force", norm: Any = "l2", *, intervals: int = 40, load: Any = None, **more: Any) -> Any:
-    """The crank's move with free accelerations at its ends; ``more`` goes to limits, but for time, places and ``ends``."""
+    """The crank's move with free accelerations at its ends; ``more`` goes to limits, but time, places, ``ends``."""
     terms = minimize if isinstance(minimize, list) else [term(minimize, norm)]
     free = {"acceleration": more.pop("ends", "free")}
     return trajopt.Problem(
