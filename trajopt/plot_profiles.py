@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,7 +57,8 @@ def plot_profiles(profiles: Profiles) -> list[Axes]:
         plot_load(problem, panels[0])
     _forces(panels[-2], profiles)
     _costs(panels[-1], profiles)
-    panels[0].set_title(problem.title or "Profiles", loc="left", fontsize=11, fontweight="bold")
+    title = "\n".join(textwrap.wrap(problem.title or "Profiles", 70))
+    panels[0].set_title(title, loc="left", fontsize=11, fontweight="bold")
     return panels
 
 
