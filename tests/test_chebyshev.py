@@ -146,7 +146,6 @@ def test_the_command_says_how_far_from_the_best_and_writes_what_can_be_checked(t
     assert done.returncode == 0, done.stderr
     assert "cheb7 11.2708331: 17.5 % above the best known" in done.stdout
     assert run("check", tmp_path / "out" / "profiles.json").returncode == 0
-    assert run("check", tmp_path / "out" / "best" / "result.json").returncode == 0
-    for words, word in ((["--degree", "4"], "degree: 4"), (["--ends", "XX"], "ends: must be JF")):
-        refused = run("profiles", "slider_crank", *words)
-        assert refused.returncode == 2 and word in refused.stderr and refused.stderr.count("\n") == 1
+    assert checker.check_file(tmp_path / "out" / "best" / "result.json").passed
+    refused = run("profiles", "slider_crank", "--degree", "4")
+    assert refused.returncode == 2 and "degree: 4" in refused.stderr and refused.stderr.count("\n") == 1

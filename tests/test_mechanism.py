@@ -182,7 +182,7 @@ def test_every_objective_and_limit_goes_through_the_same_builder(
 def test_a_torque_limit_holds_between_the_samples() -> None:
     solution = solved(crank(force=14.0))
     assert solution.audit["excess"] <= 1e-9
-    assert solution.metrics["peak_force"] == pytest.approx(14.0, rel=1e-5)
+    assert solution.metrics["peak_force"] == pytest.approx(14.0, rel=1e-3)  # drawn in by what sagged between, O(h²)
     assert solution.metrics["peak_force"] <= 14.0 * (1 + 2e-9)
     assert solution.objective is not None and solution.objective > FREE_PROFILE
 
@@ -213,7 +213,7 @@ def test_the_way_back_mirrors_the_way_there(free_profile: trajopt.Solution) -> N
 
 
 def test_in_a_cycle_the_dwell_cools_the_motor() -> None:
-    solution = solved(trajopt.load("slider_crank_dwell"))
+    solution = solved(trajopt.load("slider_crank_dwell", ["transcription.intervals=30"]))
     problem = solution.problem
     held = slider_crank.load_torque(np.array(slider_crank.TURN))
     cycle = slider_crank.DURATION + problem.move.dwell
@@ -227,7 +227,7 @@ def test_the_fastest_move_under_a_torque_limit_is_bang_bang() -> None:
     solution = solved(crank("time", None, intervals=40, time="free", force=20.0, velocity=200.0, acceleration=3e4))
     assert solution.duration is not None and solution.duration < slider_crank.DURATION
     force = np.abs(solution.frame["force"].to_numpy())
-    assert np.mean(force > 19.9) > 0.8 and solution.audit["excess"] <= 1e-9
+    assert np.mean(force > 19.5) > 0.95 and solution.audit["excess"] <= 1e-9  # but where it changes its sign
 
 
 def test_the_checker_finds_a_force_that_is_not_there(free_profile: trajopt.Solution) -> None:

@@ -146,10 +146,12 @@ class NonconvexModel:
         self.zero(position - x, span)
         found: list[Any] = []
         for curve, order in wanted:
-            size = float(np.max(np.abs(curve.at(np.array(curve.position), order)))) or 1.0
+            rows = np.array(curve.position)
+            least = np.max(np.abs(curve.value)) / span**order  # the slope of what hardly varies is rounding
+            size = float(max(np.max(np.abs(curve.at(rows, order))), least)) or 1.0
             y = self.vector(count, size, np.full(count, -np.inf), np.full(count, np.inf))
-            rows = [self._row(row, 1.0, equality=True) for row in y * (1 / size) - x * (1 / span)]
-            self._curves.append(Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], rows))
+            lines = [self._row(row, 1.0, equality=True) for row in y * (1 / size) - x * (1 / span)]
+            self._curves.append(Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], lines))
             found.append(y)
         return found
 

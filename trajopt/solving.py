@@ -234,7 +234,7 @@ def _kept(setting: Setting, chosen: Route, answer: Attempt, clock: Clock) -> Sol
         excess = solution.audit.get("excess", 0.0)
         if answer.trajectory is None or excess <= KEPT or clock.over:
             break
-        share += 1.5 * excess
+        share += 1.05 * excess
         goal = to(setting.problem.objective)
         inner = nonconvex(drawn_in(setting, share), goal, clock, answer.trajectory)
         if inner.trajectory is None:
