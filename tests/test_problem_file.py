@@ -15,14 +15,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests import bad_plants
+from tests import bad_mechanisms, bad_plants
 from tests.bad_input import CASES, FILES, LINEAR, ROTARY, Bad, BadFile
 from trajopt import preflight, problem_file
 from trajopt.errors import BadInput
 from trajopt.problem import Limit, Problem, Table
 
 JARGON = re.compile(r"Input should|Value error|_error|_type|pydantic|Traceback|recursion|object at 0x|\bnp\.")
-ALL = (*CASES, *bad_plants.CASES)
+ALL = (*CASES, *bad_plants.CASES, *bad_mechanisms.CASES)
+ALL_FILES = (*FILES, *bad_mechanisms.FILES)
 READY_MADE = sorted(entry.name[:-5] for entry in files("problems").iterdir() if entry.name.endswith(".toml"))
 
 
@@ -47,7 +48,7 @@ def test_bad_input_is_refused_in_one_line(bad: Bad) -> None:
     assert [word for word in bad.words if word not in message] == [], message
 
 
-@pytest.mark.parametrize("bad", FILES, ids=[bad.name for bad in FILES])
+@pytest.mark.parametrize("bad", ALL_FILES, ids=[bad.name for bad in ALL_FILES])
 def test_bad_file_is_refused_in_one_line(bad: BadFile, tmp_path: Path) -> None:
     path = tmp_path / "move.toml"
     bad.make(path)

@@ -36,6 +36,7 @@ _HOMES = {
     "PlantSolution": "trajopt.plant.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
+    "Curve": "trajopt.curve",
     "Envelope": "trajopt.envelope",
     **dict.fromkeys(("Norm", "L1", "L2", "Linf"), "norms"),
 }

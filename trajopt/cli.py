@@ -1,4 +1,4 @@
-"""The command line: ``trajopt solve | study | pareto | synchronise | check | export | plot | route | problems``."""
+"""The command line: ``trajopt solve | study | pareto | profiles | identify | check | export | …``, and more."""
 
 from __future__ import annotations
 
@@ -151,6 +151,66 @@ def pareto(
         if output is not None:
             print(f"wrote {output}")
     raise typer.Exit(front.status.exit_code)
+
+
+@app.command()
+def profiles(
+    source: Source,
+    overrides: Overrides = [],  # noqa: B006
+    degree: Annotated[list[int], typer.Option("--degree", help="of a Chebyshev profile; may be given again")] = [9],  # noqa: B006
+    ends: Annotated[str, typer.Option("--ends", help="JF: jerk free at the ends, J0: zero there")] = "JF",
+    box: Annotated[bool, typer.Option("--box", help="search the whole box of coefficients, too")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="write CSV, JSON and PNG into this folder")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit of the free profile, s")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare the profiles that drives offer, and Chebyshev profiles, with the best possible move."""
+    from trajopt import problem_file
+    from trajopt.problem import Problem
+    from trajopt.profiles import compare_profiles
+    from trajopt.worker import solve_apart
+
+    _refuse_seconds(seconds)
+    problem = problem_file.load(source, overrides)
+    if not isinstance(problem, Problem):
+        raise BadInput(f"{source}: profiles are laid on a [move], and this is a [plant]")
+    _make_folder(output)
+    wanted: Any = ends
+    found = compare_profiles(problem, degree, wanted, box, lambda free: solve_apart(free, seconds))
+    written = found.save(output) if output is not None else []
+    if as_json:
+        print(json.dumps(found.to_dict(), allow_nan=False))
+    else:
+        print("\n".join([*found.sentences(), *(f"wrote {path}" for path in written)]))
+    raise typer.Exit(found.best.status.exit_code)
+
+
+@app.command()
+def identify(
+    motions: Annotated[
+        list[Path], typer.Argument(metavar="CSV...", help="motions: time, position, torque, with units")
+    ],
+    friction: Annotated[
+        Path | None, typer.Option("--friction", help="a measured motion, for the viscous friction")
+    ] = None,
+    rows: Annotated[int, typer.Option("--rows", help="of the table to write")] = 181,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="write load.csv and more into this folder")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the inertia and the load torque over position from motions, and the friction from a measured one."""
+    from trajopt.identification import identify as find
+
+    _make_folder(output)
+    found = find(motions, friction, rows)
+    written = found.save(output) if output is not None else []
+    if as_json:
+        print(json.dumps(found.to_dict(), allow_nan=False))
+    else:
+        print("\n".join([*found.sentences(), *(f"wrote {path}" for path in written)]))
 
 
 @app.command()

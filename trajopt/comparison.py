@@ -131,7 +131,7 @@ def _comparable(problem: Problem) -> bool:
     """Rest to rest between given places in a given time, straight, for something that a load is paid by."""
     move = problem.move
     states = [state.fixed(problem.order) for state in (move.start, move.end)]
-    at_rest = all(state.get(i) == 0.0 for state in states for i in range(1, problem.order))
+    at_rest = all(state.get(1) == 0.0 and not any(state.get(i) for i in range(2, problem.order)) for state in states)
     paid = all(term.minimize not in (*DERIVATIVES, "time") for term in problem.objective.terms)
     fixed = move.fixed_time is not None and isinstance(move.end.position, float) and move.start_position is not None
     exact = problem.transcription.scheme == "exact"

@@ -73,7 +73,8 @@ def _one_way_rest_to_rest(problem: Problem) -> bool:
     at_rest = all(state.get(i) == 0.0 for state in states for i in range(1, problem.order))
     placed = isinstance(move.end.position, float) and move.start_position is not None
     plain = not move.via and not problem.vibration and problem.transcription.scheme == "exact"
-    constant = isinstance(load.inertia, float) and not any(x.varies for x in problem.limits.given().values())
+    constant = isinstance(load.inertia, float) and not load.curves
+    constant = constant and not any(x.varies for x in problem.limits.given().values())
     moves = problem.one_way and move.fixed_time and placed and _distance(problem) > 0
     return bool(at_rest and plain and constant and moves)
 

@@ -26,6 +26,8 @@ def metrics(trajectory: Trajectory) -> dict[str, float]:
     SI. For the Euler scheme, values at the nodes and their sums (energy by the trapezoidal rule, as in Table II).
     """
     load = trajectory.problem.load
+    if load.curves:
+        trajectory = trajectory.cut(np.linspace(0.0, trajectory.duration, _PARTS))  # short enough for polynomials
     if load.coulomb and trajectory.scheme.terms > 1:
         trajectory = trajectory.cut(_reversals(trajectory, "velocity"))  # friction jumps there
     names = [*DERIVATIVES[1 : trajectory.order + 1]]

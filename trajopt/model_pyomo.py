@@ -10,6 +10,8 @@ from typing import Any, Final
 import numpy as np
 import pyomo.environ as pyo
 
+from trajopt.along import Along, curved
+from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
 from trajopt.model import Claim, Floats, Outcome, Prices, own_size
 from trajopt.signals import Signal
@@ -25,6 +27,7 @@ _OPTIONS: Final = {
     "print_level": 0,
     "sb": "yes",
 }
+_BEYOND: Final = 0.02  # of its span: how far beyond a table Ipopt may look
 _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: they prove nothing
     0: Claim.OPTIMAL,
     1: Claim.OPTIMAL,  # acceptable, which is set to 1e-8
@@ -44,6 +47,7 @@ class NonconvexModel:
         self._vectors: list[tuple[Any, Any, float]] = []
         self._named: list[tuple[str, list[Any], float, Floats, Floats]] = []
         self._contradiction = ""
+        self._curves: list[Along] = []
 
     def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
         def bounds(_: Any, k: int) -> tuple[float | None, float | None]:
@@ -129,6 +133,28 @@ class NonconvexModel:
         self.nonpositive(-bound)
         self.nonpositive(self.total(np.square(weights), x * x) - bound * bound)
 
+    def along(self, position: Any, wanted: list[tuple[Curve, int]]) -> list[Any]:
+        """Variables for derivatives of curves at positions, which Ipopt sees with their exact derivatives.
+
+        The rows ``value - curve(position) = 0`` are written as ``value - position = 0``, and put right by
+        `trajopt.along.curved`. Positions keep within the tables, or a little beyond.
+        """
+        low, high = max(c.span[0] for c, _ in wanted), min(c.span[1] for c, _ in wanted)
+        reach = (high - low) * _BEYOND
+        count, span = len(position), high - low
+        x = self.vector(count, span, np.full(count, low - reach), np.full(count, high + reach))
+        self.zero(position - x, span)
+        found: list[Any] = []
+        for curve, order in wanted:
+            rows = np.array(curve.position)
+            least = np.max(np.abs(curve.value)) / span**order  # the slope of what hardly varies is rounding
+            size = float(max(np.max(np.abs(curve.at(rows, order))), least)) or 1.0
+            y = self.vector(count, size, np.full(count, -np.inf), np.full(count, np.inf))
+            lines = [self._row(row, 1.0, equality=True) for row in y * (1 / size) - x * (1 / span)]
+            self._curves.append(Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], lines))
+            found.append(y)
+        return found
+
     def signs(self, signal: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
         """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a signal over its size, smoothed
         over w = 1e-3 so that Ipopt can follow."""
@@ -158,7 +184,9 @@ class NonconvexModel:
         started = perf_counter()
         if self._contradiction:
             return Outcome(Claim.FAILED, self._contradiction)
-        nlp, problem, deadline = _interface(self._model, seconds)
+        for along in self._curves:
+            along.start(self.value(along.position))
+        nlp, problem, deadline = _interface(self._model, self._curves, seconds)
         for option, setting in _OPTIONS.items():
             problem.add_option(option, setting)
         x, info = problem.solve(nlp.init_primals())
@@ -186,7 +214,7 @@ class NonconvexModel:
         return {name: Prices(*map(np.concatenate, zip(*parts, strict=True))) for name, parts in found.items()}
 
     def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        nlp, _, _ = _interface(self._model, None)
+        nlp, _, _ = _interface(self._model, self._curves, None)
         nlp.set_primals(pair[0])
         return float(nlp.evaluate_objective() + pair[1] @ nlp.evaluate_constraints())
 
@@ -205,7 +233,7 @@ class _Deadline:
         return not self.passed
 
 
-def _interface(model: Any, seconds: float | None) -> tuple[Any, Any, _Deadline]:
+def _interface(model: Any, curves: list[Along], seconds: float | None) -> tuple[Any, Any, _Deadline]:
     from pyomo.contrib.pynumero.asl import AmplInterface
 
     library = Path(sys.prefix) / "lib" / "libpynumero_ASL.so"
@@ -215,7 +243,7 @@ def _interface(model: Any, seconds: float | None) -> tuple[Any, Any, _Deadline]:
         from pyomo.contrib.pynumero.interfaces.cyipopt_interface import CyIpoptNLP
         from pyomo.contrib.pynumero.interfaces.pyomo_nlp import PyomoNLP
 
-        nlp = PyomoNLP(model)
+        nlp = curved(PyomoNLP)(model, curves) if curves else PyomoNLP(model)
         deadline = _Deadline(seconds)
         return nlp, CyIpoptNLP(nlp, intermediate_callback=deadline), deadline
     except (ImportError, RuntimeError) as error:

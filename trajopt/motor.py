@@ -87,7 +87,7 @@ def implied(problem: Problem) -> Problem:
         velocity = _both(velocity, (-limits.envelope.speed[-1], limits.envelope.speed[-1]))
     force = available_force(problem, velocity)
     acceleration = _range(limits.acceleration)
-    if isinstance(load.inertia, float) and (way or not load.coulomb):
+    if isinstance(load.inertia, float) and load.force is None and (way or not load.coulomb):
         drag = [load.viscous * v if load.viscous else 0.0 for v in velocity]
         low, high = ((force[k] - drag[1 - k] - way * load.coulomb) / load.inertia for k in (0, 1))
         if load.coulomb:  # at rest friction takes any value up to Coulomb's, and the axis may stay

@@ -13,7 +13,7 @@ from trajopt.motor import Intake
 from trajopt.problem import WITHOUT_NORM, Ceiling, Load, Objective, Term
 from trajopt.transcribe import Transcript
 
-_POWERS: Final = {"energy": "power", "copper_loss": "heat", "electrical_energy": "electrical_power"}
+POWERS: Final = {"energy": "power", "copper_loss": "heat", "electrical_energy": "electrical_power"}
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def measure(transcript: Transcript, objective: Objective) -> float:
     return total
 
 
-def _integral(name: str, load: Load) -> norms.Norm:
+def integral(name: str, load: Load) -> norms.Norm:
     """What integrates the power behind an energy: its magnitude, all of it, or what the drive takes from the grid."""
     if name == "energy":
         return norms.L1()
@@ -101,7 +101,7 @@ class _Measured:
         if term.minimize == "time":
             return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, 1.0)
         energy = term.minimize in WITHOUT_NORM
-        quantity = _POWERS.get(term.minimize, term.minimize)
+        quantity = POWERS.get(term.minimize, term.minimize)
         signal = transcript.quantities.signal(quantity)
         weights = transcript.scheme.weights(signal, transcript.mesh)
         typical = sizes.duration
@@ -113,6 +113,6 @@ class _Measured:
         samples = signal.samples(transcript.model)
         if quantity == "position" and transcript.problem.move.start_position is None:
             samples = samples - transcript.chain[0][0]  # positions are absolute then; the norm is of the displacement
-        norm = term.norm or _integral(term.minimize, transcript.problem.load)
+        norm = term.norm or integral(term.minimize, transcript.problem.load)
         unit = norm.measure(np.ones(len(weights)), weights, typical)
         return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), unit)

@@ -185,6 +185,9 @@ def curve(trajectory: Trajectory, name: str) -> tuple[Floats, Floats]:
         return time, motor.power(trajectory.problem.load, force, np.interp(time, *curve(trajectory, "velocity")))
     signal = trajectory.signal(name)
     origin = trajectory.origin if name == "position" else 0.0
+    if signal.points:
+        trajectory = trajectory.cut(np.empty(0))
+        signal = trajectory.signal(name)
     if not signal.pieces:
         return trajectory.time, signal.nodes + origin
     pieces = np.stack(np.broadcast_arrays(*signal.pieces))

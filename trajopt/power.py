@@ -105,11 +105,11 @@ def _linearised_at(reference: Trajectory) -> Any:
     class Linearised(Quantities):
         def _power(self) -> Signal:
             pairs = zip(self.ends("force", "velocity"), forces, strict=True)
-            return signals.sampled([_product_at(self.model, x, x0) for x, x0 in pairs])
+            return signals.sampled([_product_at(self.model, x, x0) for x, x0 in pairs], self.signal("force"))
 
         def _electrical_power(self) -> Signal:
             here = self.ends("force", "acceleration", "velocity", "current")
-            return signals.sampled([self._drawn(x, x0) for x, x0 in zip(here, at, strict=True)])
+            return signals.sampled([self._drawn(x, x0) for x, x0 in zip(here, at, strict=True)], self.signal("force"))
 
         def _drawn(self, here: Any, there: Any) -> Any:
             (_, a, v, u), (_, a0, v0, u0) = here, there
@@ -165,8 +165,8 @@ class Lifted(Quantities):
         mechanical = self._power()
         if mechanical.degree == 0:  # the mean of both ends alone is known
             return Signal(None, (sum(heats[1:], heats[0]) * (1 / len(heats)) + mechanical.pieces[0],))
-        powers = mechanical.ends(mechanical.nodes is not None)
-        return signals.sampled([heat + power for heat, power in zip(heats, powers, strict=True)])
+        powers = [heat + power for heat, power in zip(heats, mechanical.stations, strict=True)]
+        return signals.sampled(powers, mechanical)
 
     def _ends(self) -> Signal:
         """Power at both ends of every interval, affine in the chain, the lifted squares and the spread b; or the mean

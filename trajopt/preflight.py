@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from trajopt import units
-from trajopt.fields import Limit
+from trajopt.fields import Limit, Table
 from trajopt.problem import DERIVATIVES, ELECTRICAL, LOADED, MOST_INTERVALS, MOTOR, Problem, State
 from trajopt.rating import refuse_weak_motor
 
@@ -23,6 +23,7 @@ def refuse_contradictions(problem: Problem) -> None:
     """Raise ValueError for a problem that cannot be meant as it stands."""
     _time(problem)
     _load(problem)
+    _curves(problem)
     _via(problem)
     _vibration(problem)
     for where, state in _states(problem):
@@ -37,7 +38,7 @@ def warnings(problem: Problem | PlantProblem) -> list[str]:
     plain numbers of a plant give none away."""
     if not isinstance(problem, Problem):
         return []
-    return [*_clamped(problem), *_wrong_units(problem), *_coarse(problem), *_heavy(problem)]
+    return [*_clamped(problem), *_wrong_units(problem), *_degrees(problem), *_coarse(problem), *_heavy(problem)]
 
 
 def _clamped(problem: Problem) -> list[str]:
@@ -96,7 +97,7 @@ def _time(problem: Problem) -> None:
         raise ValueError("move.end: the move ends in the state in which it starts: it takes no time; give move.time")
     if any(limit.varies for limit in problem.limits.given().values()) or problem.move.via:
         raise ValueError('move.time: limits by time and via states need a fixed move.time such as "1 s"')
-    if problem.load.inertia is not None and not isinstance(problem.load.inertia, float):
+    if isinstance(problem.load.inertia, Table):
         raise ValueError('move.time: an inertia that varies in time needs a fixed move.time such as "1 s"')
 
 
@@ -129,6 +130,24 @@ def _load(problem: Problem) -> None:
         if needs and getattr(load, key) is None:
             example = units.kinds(problem.rotary)[key].example
             raise ValueError(f'load.{key}: is missing; {needs[0]} needs it; write {key} = "{example}"')
+
+
+def _curves(problem: Problem) -> None:
+    """A load over position must be known wherever the move is asked to be."""
+    kinds = units.kinds(problem.rotary)
+    if problem.load.curves and problem.transcription.scheme == "euler":
+        raise ValueError('transcription.scheme: a load over position needs "exact"')
+    for name, curve in problem.load.curves.items():
+        low, high = curve.span
+        origin = {} if problem.move.start_position is None else {"move.start.position": problem.move.start_position}
+        given = {f"{where}.position": state.position for where, state in _states(problem)} | origin
+        for where, place in given.items():
+            if isinstance(place, float) and not low - curve.room <= place <= high + curve.room:
+                unit = kinds["position"].unit
+                raise ValueError(
+                    f"load.{problem.shown(name)}: its table runs from {low:.6g} to {high:.6g} {unit}, too short for"
+                    f" {where} = {place:.6g} {unit}; extend it, and see that its positions are in {unit}"
+                )
 
 
 def _via(problem: Problem) -> None:
@@ -293,6 +312,19 @@ def _wrong_units(problem: Problem) -> list[str]:
             found.append(
                 f"limits.{name}: makes the least time {_span(least)}, against {_span(scale)}"
                 f" {'of move.time' if duration is not None else 'by the other limits'}; unit mistake?"
+            )
+    return found
+
+
+def _degrees(problem: Problem) -> list[str]:
+    """Tables over angles of many turns, where the move takes a small part of one."""
+    stroke, found = _stroke(problem), []
+    for name, curve in problem.load.curves.items():
+        span = curve.span[1] - curve.span[0]
+        if problem.rotary and 0 < stroke < 2 * math.pi < 30 * stroke < span:
+            found.append(
+                f"load.{problem.shown(name)}: its table spans {span:g} rad, {span / stroke:.0f} times the move; degrees"
+                " taken for radians?"
             )
     return found
 

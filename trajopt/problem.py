@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, Va
 
 import norms
 from trajopt import units
+from trajopt.curve import Curve, read_curve
 from trajopt.envelope import Envelope, read_envelope
 from trajopt.fields import (
     Limit,
@@ -159,26 +160,49 @@ class Limits(Section):
 def _inertia(value: Any, info: ValidationInfo) -> Any:
     if value is None:
         return value
-    table = value if isinstance(value, Table) else None
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and {"position", "csv"} & value.keys():
+        value = read_curve(value, "inertia", info)
+    elif isinstance(value, Mapping):
         refuse_unknown(value, ("time", "value"))
-        table = read_table(dict(value), "inertia", "value", info)
-    smallest = min(table.value) if table else (number := si(value, "inertia", info))
-    if not smallest > 0:
+        value = read_table(dict(value), "inertia", "value", info)
+    if isinstance(value, Curve):
+        return _positive_everywhere(value)
+    number = min(value.value) if isinstance(value, Table) else si(value, "inertia", info)
+    if not number > 0:
         raise ValueError(f"must be > 0, got {shown(value)}")
-    return table or number
+    return value if isinstance(value, Table) else number
+
+
+def _positive_everywhere(curve: Curve) -> Curve:
+    if (least := min(curve.value)) <= 0:
+        at = curve.position[curve.value.index(least)]
+        raise ValueError(f"must be > 0 everywhere, got {least:.6g} at position {at:.6g}")
+    if (least := curve.lowest) <= 0:
+        raise ValueError(f"must be > 0 everywhere, but falls to {least:.3g} between its rows; export a finer table")
+    return curve
+
+
+def _load_force(value: Any, info: ValidationInfo) -> Any:
+    if value is None or isinstance(value, Curve):
+        return value
+    if not isinstance(value, Mapping):
+        raise ValueError(f'must be a table over position such as {{ csv = "load.csv" }}, got {shown(value)}')
+    return read_curve(value, "force", info)
 
 
 class Load(Section):
     """What is moved: force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13 to 15), and by which motor.
 
-    ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, or a Table over time
-    (Remark 1); ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor see `trajopt.motor`: ``torque_constant``
-    N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)² or (A rad/s)², ``hysteresis`` W per m/s
-    or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it feeds back can be used.
+    ``inertia`` is a mass (kg) on a linear axis, a moment of inertia (kg m²) on a rotary one, a Table over time
+    (Remark 1), or a Curve over position, which adds ½ J'(q) v² (Van Oosterwyck et al. eq. 1). ``force``: the load's own
+    over position, N or N m, such as that of gravity. ``coulomb`` N or N m; ``viscous`` N s/m or N m s. For the motor
+    see `trajopt.motor`: ``torque_constant`` N/A or N m/A, ``resistance`` Ω, ``switching`` W/A, ``eddy`` W per (A m/s)²
+    or (A rad/s)², ``hysteresis`` W per m/s or rad/s at 1 A, and its exponent; ``recovery``: which share of the power it
+    feeds back can be used.
     """
 
-    inertia: Annotated[float | Table | None, BeforeValidator(_inertia)] = None
+    inertia: Annotated[float | Table | Curve | None, BeforeValidator(_inertia)] = None
+    force: Annotated[Curve | None, BeforeValidator(_load_force)] = None
     coulomb: Annotated[float, nonnegative("force")] = 0.0
     viscous: Annotated[float, nonnegative("viscous")] = 0.0
     torque_constant: Annotated[float | None, positive("torque_constant")] = None
@@ -195,6 +219,11 @@ class Load(Section):
         if self.torque_constant is None or self.resistance is None:
             return None
         return self.torque_constant, self.resistance
+
+    @property
+    def curves(self) -> dict[str, Curve]:
+        """What is a curve over position, by name."""
+        return {name: x for name in ("inertia", "force") if isinstance(x := getattr(self, name), Curve)}
 
 
 MOTOR: Final = (
@@ -415,8 +444,23 @@ def _printable(text: str) -> str:
 OneLine = Annotated[str, AfterValidator(_printable)]
 
 
+def _within(limit: Limit | None, span: tuple[float, float]) -> Limit:
+    """A position limit that also keeps within a span."""
+
+    def side(bound: float | Table | None, otherwise: float) -> float | Table:
+        if isinstance(bound, Table):
+            return bound.model_copy(update={"value": tuple(np.clip(bound.value, *span).tolist())})
+        return otherwise if bound is None else float(np.clip(bound, *span))
+
+    limit = limit or Limit()
+    return Limit(min=side(limit.min, span[0]), max=side(limit.max, span[1]))
+
+
 class Problem(Section):
-    """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy."""
+    """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy.
+
+    A load over position keeps the position within its table, as a limit.
+    """
 
     move: Move
     objective: Objective
@@ -433,6 +477,12 @@ class Problem(Section):
     def _consistent(self) -> Self:
         from trajopt.preflight import refuse_contradictions
 
+        states = (self.move.start, self.move.end, *self.move.via)
+        places = [self.move.start_position, *(state.position for state in states)]
+        for curve in self.load.curves.values():  # beyond its table the load is unknown
+            span = curve.around([x for x in places if isinstance(x, float)])
+            limits = self.limits.model_copy(update={"position": _within(self.limits.position, span)})
+            self.__dict__["limits"] = limits
         refuse_contradictions(self)
         return self
 

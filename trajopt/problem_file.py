@@ -49,10 +49,11 @@ _LISTS: Final = {
     "ceilings": '[{ of = "energy", at_most = "0.9 J" }]',
     "terms": '[{ minimize = "jerk", norm = "l2" }]',
 }
+_WANTED: Final = "a problem file or a ready-made problem's name"
 _KEY_EXAMPLE: Final = 'for example move.end.position="0.3 m"'
 _SAVE_PLAIN: Final = "save it as plain UTF-8 without a byte order mark or NUL bytes"
 _ALIASES: Final = {
-    "load": {"mass": "inertia", "force_constant": "torque_constant"},
+    "load": {"mass": "inertia", "force_constant": "torque_constant", "torque": "force"},
     "limits": {"torque": "force", "rms_torque": "rms_force"},
 }
 
@@ -62,15 +63,18 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
 
     Raises BadInput with one line naming the file, the field and the remedy.
     """
-    return parse(read_text(find(Path(path), ready_made())), overrides, name=str(path))
+    source = find(Path(path), ready_made())
+    return parse(read_text(source), overrides, str(path), source.parent)
 
 
-def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem:
-    """The problem stated by a TOML text. Raises BadInput."""
+def parse(
+    text: str, overrides: Sequence[str] = (), name: str = "problem", folder: Path | None = None
+) -> p.Problem | PlantProblem:
+    """The problem stated by a TOML text, with the tables it names in ``folder`` (here, by default). Raises BadInput."""
     data = read_toml(text, name)
     for override in overrides:
         _override(data, override)
-    return from_dict(data, name)
+    return from_dict(data, name, folder)
 
 
 def read_toml(text: str, name: str) -> dict[str, Any]:
@@ -83,15 +87,16 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
         raise refused(name, f"not a TOML file: {_remedied(str(error))}") from None
 
 
-def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem:
+def from_dict(data: dict[str, Any], name: str = "problem", folder: Path | None = None) -> p.Problem | PlantProblem:
     """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
     if "plant" in data:
         return _plant(data, name)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
+    context = {"rotary": rotary, "texts_only": True, "folder": folder or Path()}
     try:
-        return p.Problem.model_validate({"rotary": rotary, **data}, context={"rotary": rotary, "texts_only": True})
+        return p.Problem.model_validate({"rotary": rotary, **data}, context=context)
     except ValidationError as error:
         raise refused(name, _as_written(explain(error), written)) from None
 
@@ -108,7 +113,7 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
         raise refused(name, explain(error, PlantProblem)) from None
 
 
-def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
+def read_text(path: Path, largest: int = LARGEST_FILE, wanted: str = _WANTED) -> str:
     """The text of a regular UTF-8 file of at most ``largest`` bytes. Raises BadInput."""
     name = str(path)
     try:
@@ -120,11 +125,11 @@ def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
             os.close(handle)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise refused(name, f"cannot be read: {reason}; give a problem file or a ready-made problem's name") from None
+        raise refused(name, f"cannot be read: {reason}; give {wanted}") from None
     if not regular:
-        raise refused(name, "not a regular file; give a problem file")
+        raise refused(name, f"not a regular file; give {wanted}")
     if len(raw) > largest:
-        raise refused(name, f"larger than {largest // 1_000_000} MB; a problem file takes a few lines")
+        raise refused(name, f"larger than {largest // 1_000_000} MB; give {wanted}")
     if raw.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")) or b"\0" in raw:
         raise refused(name, _SAVE_PLAIN)
     try:

@@ -23,6 +23,8 @@ def refuse_weak_motor(problem: Problem) -> None:
     if not any(getattr(limits, name) is not None for name in _JUDGED):
         return
     _ends(problem)
+    if problem.load.curves:  # the load itself may help or hinder
+        return
     start, end = (state.fixed(2) for state in (move.start, move.end))
     if 0 not in start or 0 not in end or start[0] == end[0] or problem.load.inertia is None:
         return

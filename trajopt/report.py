@@ -112,7 +112,7 @@ def objective_name(problem: Problem) -> str:
 
 
 def _between_nodes(solution: Solution) -> str | None:
-    """Where a peak was minimised at the nodes and is exceeded between them, by how much."""
+    """Where a peak was minimised at samples and is exceeded between them, by how much."""
     terms = solution.problem.objective.terms
     peak = solution.metrics.get(f"peak_{terms[0].minimize}")
     if len(terms) > 1 or terms[0].norm is None or terms[0].norm.name != "linf" or peak is None:
@@ -169,11 +169,13 @@ def _table(solution: Solution) -> Table:
 
 
 def _add_cycle(table: Table, solution: Solution, limit: Limit) -> None:
-    """The RMS of force over the move and the rest after it."""
+    """The RMS of force over the move and the rest after it, in which a load over position is held."""
     assert solution.duration is not None
     kind = units.kinds(solution.problem.rotary)["rms_force"]
-    share = solution.duration / (solution.duration + solution.problem.move.dwell)
-    rms = solution.metrics["rms_force"] * sqrt(share)
+    dwell, load = solution.problem.move.dwell, solution.problem.load
+    held = 0.0 if load.force is None else float(load.force.at(solution.at(solution.duration)["position"]))
+    square = solution.metrics["rms_force"] ** 2 * solution.duration + held**2 * dwell
+    rms = sqrt(square / (solution.duration + dwell))
     table.add_row(f"{kind.name} of the cycle", "", f"{rms:.6g}", f"{limit.highest:g}", kind.unit)
 
 

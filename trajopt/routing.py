@@ -99,9 +99,8 @@ def has_power_bound(problem: Problem) -> bool:
     """Whether `trajopt.power` can bound power and energy globally: exact scheme, jerk or acceleration on top, fixed
     time, one way, ends of given velocity (and acceleration), equal steps. Elsewhere no global bound is known."""
     move = problem.move
-    varies = any(limit.varies for limit in problem.limits.given().values()) or not isinstance(
-        problem.load.inertia, float
-    )
+    varies = any(limit.varies for limit in problem.limits.given().values()) or bool(problem.load.curves)
+    varies = varies or not isinstance(problem.load.inertia, float)
     return (
         problem.transcription.scheme == "exact"
         and problem.order in (2, 3)
@@ -121,12 +120,15 @@ def _nonconvex(problem: Problem) -> str:
         return "the duration is free: step times velocity is a product of unknowns"
     for term in problem.objective.all_terms:
         if not is_affine(problem, term.minimize):
-            return f"{term.label} is nonconvex: " + (
-                "friction changes sign with the velocity"
-                if term.minimize in FORCES
-                else "a product of force and velocity"
-            )
+            return f"{problem.shown(term.label)} is nonconvex: {_product(problem, term.minimize)}"
     return ""
+
+
+def _product(problem: Problem, name: str) -> str:
+    curves = [problem.shown(curve) for curve in problem.load.curves]
+    if curves:
+        return f"the load's {' and '.join(curves)} depend{'' if len(curves) > 1 else 's'} on the position"
+    return "friction changes sign with the velocity" if name in FORCES else "a product of force and velocity"
 
 
 def _not_quadratic(problem: Problem) -> str:

@@ -83,6 +83,7 @@ def _of_chain(load: Load, derivative: tuple[float, ...], duration: float) -> Siz
     inertia = load.inertia
     mass = 0.0 if inertia is None else inertia if isinstance(inertia, float) else max(inertia.value)
     force = mass * derivative[2] + load.viscous * derivative[1] + load.coulomb
+    force += 0.0 if load.force is None else max(map(abs, load.force.value))
     return _with_motor(load, Sizes(derivative, duration, force or 1.0))
 
 

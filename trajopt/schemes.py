@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.mesh import Floats, Mesh
-from trajopt.signals import Arithmetic, Signal
+from trajopt.signals import SHARES, Arithmetic, Signal
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,10 @@ class Scheme:
     def weights(self, signal: Signal, mesh: Mesh) -> Floats:
         """What fraction of the duration each sample of the signal stands for; plain ones for Euler."""
         steps = mesh.steps
+        if signal.points:
+            inner = [share * steps for share in SHARES]
+            ends = [inner[0], inner[-1]] if signal.nodes is None else [2 * SHARES[0] * trapezoids(steps)]
+            return np.concatenate([ends[0], *inner[1:-1], *ends[1:]])
         if signal.nodes is not None:
             if self.terms == 1:
                 return np.ones(len(steps) + 1)

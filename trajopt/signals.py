@@ -1,18 +1,27 @@
 """Signals over the mesh: what a limit bounds, a norm measures and a load turns into force and power.
 
 A signal is a polynomial on every interval, held by its Bernstein coefficients: they bound it between nodes, and sums
-and products of polynomials are sums and products of coefficients. The same code works on the expressions of any model
-and on floats.
+and products of polynomials are sums and products of coefficients. What a load over position makes is none; it is held
+by its values at the Lobatto points of every interval, whose weights integrate polynomials of degree five exactly. The
+same code works on the expressions of any model and on floats.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import comb
-from typing import Any, Protocol
+from math import comb, sqrt
+from operator import add
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from trajopt.curve import Curve
+
+LOBATTO: Final = (0.0, (1 - 1 / sqrt(5)) / 2, (1 + 1 / sqrt(5)) / 2, 1.0)
+SHARES: Final = (1 / 12, 5 / 12, 5 / 12, 1 / 12)
 
 
 class Arithmetic(Protocol):
@@ -44,6 +53,10 @@ class OnFloats:
         """|x|."""
         return np.abs(x)
 
+    def along(self, position: Any, wanted: list[tuple[Curve, int]]) -> list[Any]:
+        """The derivatives of curves, each by its order, at a vector of positions."""
+        return [curve.at(position, order) for curve, order in wanted]
+
     def raised(self, x: Any, exponent: float, size: float) -> tuple[Any, Any]:
         """|x| to an exponent of one or more, and its slope in x."""
         return np.abs(x) ** exponent, exponent * np.abs(x) ** (exponent - 1) * np.sign(x)
@@ -65,10 +78,12 @@ class BetweenReversals(OnFloats):
 @dataclass(frozen=True)
 class Signal:
     """``nodes`` (N+1,) values at nodes, None where the signal may jump there; ``pieces``: the Bernstein coefficients
-    on the intervals, lowest first, (N,) each; empty where only the nodes mean something (Euler)."""
+    on the intervals, lowest first, (N,) each; empty where only the nodes mean something (Euler). With ``points`` the
+    pieces are values at these fractions of the intervals."""
 
     nodes: Any
     pieces: tuple[Any, ...]
+    points: tuple[float, ...] = ()
 
     @property
     def degree(self) -> int:
@@ -77,6 +92,8 @@ class Signal:
 
     def samples(self, model: Arithmetic) -> Any:
         """The values a norm sees: at the nodes, or on the intervals, or at both ends of every interval."""
+        if self.points:
+            return model.concatenate(self.stations)
         if self.nodes is not None:
             return self.nodes
         return self.pieces[0] if self.degree == 0 else model.concatenate([self.pieces[0], self.pieces[-1]])
@@ -87,9 +104,19 @@ class Signal:
         terms = [model.times(comb(n, i) * s**i * (1 - s) ** (n - i), x) for i, x in enumerate(self.pieces)]
         return sum(terms[1:], terms[0])
 
-    def ends(self, at_nodes: bool) -> list[Any]:
-        """The values at the nodes, or at the left and at the right ends of the intervals."""
-        return [self.nodes] if at_nodes else [self.pieces[0], self.pieces[-1]]
+    @property
+    def stations(self) -> list[Any]:
+        """Vectors of the values where the signal is sampled: at the nodes, or at the left and at the right ends of the
+        intervals; with ``points`` at the nodes and at those."""
+        if self.points:
+            return [*([] if self.nodes is None else [self.nodes]), *self.pieces]
+        return [self.nodes] if self.nodes is not None else [self.pieces[0], self.pieces[-1]]
+
+    def where(self, model: Arithmetic, other: Signal) -> list[Any]:
+        """The values where another signal is sampled."""
+        if other.points and not self.points:
+            return [*([] if other.nodes is None else [self.nodes]), *(self.within(model, s) for s in other.points)]
+        return self.stations if self.points or other.nodes is not None else [self.pieces[0], self.pieces[-1]]
 
 
 def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -98,9 +125,18 @@ def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return (points + 1) / 2, weights / 2
 
 
-def sampled(ends: list[Any]) -> Signal:
-    """The signal of which only the values at the nodes are known, or those at both ends of every interval."""
-    return Signal(ends[0], ()) if len(ends) == 1 else Signal(None, tuple(ends))
+def sampled(stations: list[Any], like: Signal) -> Signal:
+    """The signal of which only the values are known where another one is sampled."""
+    if like.points and like.nodes is not None:
+        return Signal(stations[0], tuple(stations[1:]), like.points)
+    return Signal(stations[0], ()) if len(stations) == 1 else Signal(None, tuple(stations), like.points)
+
+
+def fitted(values: list[NDArray[np.float64]], points: NDArray[np.float64]) -> Signal:
+    """The polynomials through values at ``points`` of every interval, ends included, as many as coefficients."""
+    n = len(points) - 1
+    basis = np.array([[comb(n, i) * s**i * (1 - s) ** (n - i) for i in range(n + 1)] for s in points])
+    return Signal(None, tuple(np.linalg.solve(basis, np.stack(values))))
 
 
 def constant(value: Any, intervals: int) -> Signal:
@@ -113,8 +149,15 @@ def linear(nodes: Any) -> Signal:
     return Signal(nodes, (nodes[:-1], nodes[1:]))
 
 
+def _each(model: Arithmetic, combine: Callable[[Any, Any], Any], a: Signal, b: Signal) -> Signal:
+    like = a if a.points else b
+    return sampled([combine(x, y) for x, y in zip(a.where(model, like), b.where(model, like), strict=True)], like)
+
+
 def product(model: Arithmetic, a: Signal, b: Signal) -> Signal:
     """a·b. ``a`` must be constant unless the model is nonconvex."""
+    if a.points or b.points:
+        return _each(model, model.times, a, b)
     nodes = None if a.nodes is None or b.nodes is None else model.times(a.nodes, b.nodes)
     if not a.pieces or not b.pieces:
         return Signal(nodes, ())
@@ -132,6 +175,8 @@ def product(model: Arithmetic, a: Signal, b: Signal) -> Signal:
 
 def plus(model: Arithmetic, a: Signal, b: Signal) -> Signal:
     """a + b, at the higher of the two degrees."""
+    if a.points or b.points:
+        return _each(model, add, a, b)
     nodes = None if a.nodes is None or b.nodes is None else a.nodes + b.nodes
     if not a.pieces or not b.pieces:
         return Signal(nodes, ())

@@ -10,7 +10,7 @@ import numpy as np
 
 import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
-from trajopt.conclude import conclude, first_solved
+from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import findings
 from trajopt.explain import explain_power
 from trajopt.model import Claim, Outcome
@@ -31,6 +31,7 @@ from trajopt.verdict import Verdict
 
 _DRAWN = 3e-9  # of a limit
 _LATER = 2e-8  # of a least time
+_ROUNDS = 4  # of drawing in
 
 
 def solve(problem: Problem, seconds: float | None = None, start: Trajectory | None = None) -> Solution:
@@ -126,7 +127,8 @@ def _coasting(setting: Setting) -> Attempt | None:
 def _may_earn(problem: Problem) -> bool:
     """Whether the objective can be negative from an end to one of the same velocity: braking a load that has grown
     heavier gives back more than speeding it up has taken."""
-    recovers = problem.load.recovery > 0 and not isinstance(problem.load.inertia, float)
+    load = problem.load
+    recovers = load.recovery > 0 and (bool(load.curves) or not isinstance(load.inertia, float))
     return recovers and any(term.minimize == "electrical_energy" for term in problem.objective.terms)
 
 
@@ -207,7 +209,7 @@ def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: C
         status = Verdict.IMPOSSIBLE_ON_GRID
         return Solution(status, setting.problem, chosen, explanation=found, timings=timings, message=text)
     bound = max(attempt.bound, relax(setting, clock).bound if has_power_bound(setting.problem) else -np.inf)
-    return conclude(setting, chosen, replace(local, bound=bound), clock, local=True)
+    return _kept(setting, chosen, replace(local, bound=bound), clock)
 
 
 def _local(setting: Setting, chosen: Route, clock: Clock, start: Trajectory | None) -> Solution:
@@ -222,7 +224,29 @@ def _local(setting: Setting, chosen: Route, clock: Clock, start: Trajectory | No
     bounded = has_power_bound(problem) or (_is_affine(problem) and not nonaffine_limits(problem))
     if answer.trajectory is not None and bounded and problem.move.fixed_time is not None:
         answer = replace(answer, bound=relax(setting, clock).bound)
-    return conclude(setting, chosen, answer, clock, local=True)
+    return _kept(setting, chosen, answer, clock)
+
+
+def _kept(setting: Setting, chosen: Route, answer: Attempt, clock: Clock) -> Solution:
+    """The conclusion of a local answer. What a load over position makes is held at samples only: where the check finds
+    a limit exceeded between them, the limits are drawn in by as much, and Ipopt goes on from there."""
+    solution = conclude(setting, chosen, answer, clock, local=True)
+    share, rounds = 0.0, _ROUNDS if setting.problem.load.curves else 0
+    for _ in range(rounds):
+        excess = solution.audit.get("excess", 0.0)
+        if answer.trajectory is None or excess <= KEPT or clock.over:
+            break
+        share += 1.05 * excess
+        goal = to(setting.problem.objective)
+        inner = nonconvex(drawn_in(setting, share), goal, clock, answer.trajectory)
+        if inner.trajectory is None:
+            break
+        inner = replace(inner, bound=answer.bound, notes=answer.notes)
+        found = conclude(setting, chosen, inner, clock, local=True)
+        if not found.status.solved and solution.status.solved:
+            break
+        answer, solution = inner, found
+    return solution
 
 
 def _from_several_starts(

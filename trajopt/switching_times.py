@@ -67,7 +67,7 @@ def _acceleration(problem: Problem) -> tuple[float, float] | None:
     low, high = _pair(problem.limits.acceleration)
     if force is None:
         return low, high
-    if load.viscous or not isinstance(load.inertia, float) or (load.coulomb and not way):
+    if load.viscous or load.curves or not isinstance(load.inertia, float) or (load.coulomb and not way):
         return None
     drag = way * load.coulomb
     low, high = max(low, (force.lowest - drag) / load.inertia), min(high, (force.highest - drag) / load.inertia)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from trajopt import vibration
+from trajopt.envelope import Envelope
 from trajopt.fields import Limit, Table
 from trajopt.mesh import Floats, Mesh, mesh_for
 from trajopt.model import own_size
@@ -59,12 +60,14 @@ def drawn_in(setting: Setting, share: float) -> Setting:
         given = [sign * state[i] for state in states if i in state]
         return sign * max(sign * bound - share * abs(bound), max(given, default=-np.inf))
 
-    limits = {
+    limits: dict[str, Limit | Envelope] = {
         name: limit.model_copy(update={"min": side(name, limit.min, -1.0), "max": side(name, limit.max, 1.0)})
         for name, limit in setting.problem.limits
         if isinstance(limit, Limit)
     }
     problem = setting.problem
+    if problem.limits.envelope is not None:
+        limits["envelope"] = problem.limits.envelope.scaled(1 - share)
     return replace(setting, problem=problem.model_copy(update={"limits": problem.limits.model_copy(update=limits)}))
 
 
@@ -190,13 +193,20 @@ def _hold(transcript: Transcript, name: str, signal: Signal, limit: Limit) -> No
         _rows(transcript, name, signal.nodes, sides(problem, i, limit, duration, mesh.fractions), mesh.fractions)
     if i == problem.order:
         return  # the top derivative is constant on intervals: nothing is left to hold
-    for b in range(1, signal.degree) if signal.nodes is not None else range(signal.degree + 1):
-        left, right = mesh.fractions[:-1], mesh.fractions[1:]
-        where = left + (right - left) * (b / signal.degree if signal.degree else 0.5)
+    for b, at in _between(signal):
+        where = mesh.fractions[:-1] + mesh.steps * at
         lower, upper = sides(problem, i, limit, duration, where)
         if i >= 0:
             _skip_prescribed(problem, mesh, i, b, signal.degree, lower, upper)
         _rows(transcript, name, signal.pieces[b], (lower, upper), where)
+
+
+def _between(signal: Signal) -> list[tuple[int, float]]:
+    """The pieces that are held beside the nodes, each with its place in the intervals."""
+    if signal.points:
+        return list(enumerate(signal.points))
+    held = range(1, signal.degree) if signal.nodes is not None else range(signal.degree + 1)
+    return [(b, b / signal.degree if signal.degree else 0.5) for b in held]
 
 
 def _envelope(transcript: Transcript, name: str, limit: Limit) -> None:
@@ -212,17 +222,22 @@ def _envelope(transcript: Transcript, name: str, limit: Limit) -> None:
 
 
 def _rms(transcript: Transcript, name: str, limit: Limit) -> None:
-    """The RMS of force over the cycle, exactly: by Gauss points on the interval polynomials (Euler: trapezoids)."""
+    """The RMS of force over the cycle, exactly: by Gauss points on the interval polynomials (Euler: trapezoids; a load
+    over position: Lobatto points, and what holds it through the dwell)."""
     model, size, duration = transcript.model, transcript.sizes.of(name), transcript.duration
-    force, steps = transcript.quantities.signal("force"), transcript.mesh.steps
-    if force.pieces:
+    force, steps, dwell = transcript.quantities.signal("force"), transcript.mesh.steps, transcript.problem.move.dwell
+    if force.points:
+        held = transcript.quantities.holding() * (dwell / duration) ** 0.5
+        samples = model.concatenate([force.samples(model), np.array([held], dtype=object)])
+        weights = np.append(transcript.scheme.weights(force, transcript.mesh), 1.0)
+    elif force.pieces:
         points, shares = gauss(force.degree + 1)
         samples = model.concatenate([force.within(model, point) for point in points])
         weights = np.concatenate([share * steps for share in shares])
     else:
         samples, weights = force.nodes, trapezoids(steps)
     rms = model.variable(1)
-    cycle = (duration + transcript.problem.move.dwell) / duration
+    cycle = (duration + dwell) / duration
     model.at_least_length(rms[0] * cycle**0.5, samples * (1 / size), np.sqrt(weights))
     highest = np.array([limit.highest])
     _rows(transcript, name, rms * size, (-np.inf * highest, highest), np.array([0.5]))
@@ -233,9 +248,12 @@ def _brake(transcript: Transcript, name: str, limit: Limit) -> None:
     model, size, steps = transcript.model, transcript.sizes.of("electrical_power"), transcript.mesh.steps
     returned = transcript.quantities.returned()
     coefficients = list(returned.pieces) or [returned.nodes]
-    weights = steps / len(returned.pieces) if returned.pieces else trapezoids(steps)
+    shares = [steps / len(coefficients) if returned.pieces else trapezoids(steps)] * len(coefficients)
+    if returned.points:
+        coefficients = [returned.samples(model)]
+        shares = [transcript.scheme.weights(returned, transcript.mesh)]
     energy: Any = 0.0
-    for values in coefficients:
+    for values, weights in zip(coefficients, shares, strict=True):
         bound = model.variable(len(weights))
         model.nonpositive(values * (1 / size) - bound)
         model.nonpositive(-bound)

@@ -6,8 +6,11 @@ instant, by bounds on Bernstein coefficients and halving. Two twins do the same 
 one in rational numbers. The float twin goes first; whatever lies within ten times of its tolerance, or where rounding
 could matter, the rational twin decides.
 
-Imports go one way: report, case, reading and polynomials, the two twins, questions, checking, front; result_file
-beside.
+What a load over position makes is a polynomial between the knots of its splines, too. When the axis passes those is
+known in floats only, and so the float twin alone decides there.
+
+Imports go one way: report, case, polynomials, splines, reading, the two twins, questions, checking, front; result_file
+and laws (of motion, in closed form) beside.
 
 Tolerances, relative: limits 1e-6 (strict 1e-9) of the lesser of the limit and the signal's own peak; boundary and via
 positions 1e-6 of the displacement, derivatives 1e-6 of their peak; objective and metrics 1e-6; dynamics 1e-9 per

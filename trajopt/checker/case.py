@@ -7,12 +7,15 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.checker.report import Check, question, to_float
+
+if TYPE_CHECKING:
+    from trajopt.checker.splines import Spline
 
 DERIVATIVES: Final = ("position", "velocity", "acceleration", "jerk", "snap")
 LOADED: Final = ("force", "power")
@@ -98,7 +101,8 @@ class Case:
     end: dict[int, float]
     via: tuple[Via, ...]
     limits: dict[str, tuple[Curve | None, Curve | None]]
-    inertia: Curve | None
+    inertia: Curve | Spline | None  # over time, or over position
+    force: Spline | None  # of the load itself, over position
     coulomb: float
     viscous: float
     motor: Motor | None
@@ -150,7 +154,7 @@ class Case:
     def corners(self) -> tuple[float, ...]:
         """Times inside the move at which a limit or the inertia has a corner."""
         curves = [side for limit in self.limits.values() for side in limit] + [self.inertia]
-        times = {t for curve in curves if curve is not None and len(curve.time) > 1 for t in curve.time}
+        times = {t for curve in curves if isinstance(curve, Curve) and len(curve.time) > 1 for t in curve.time}
         return tuple(sorted(t for t in times if 0 < t < self.end_time))
 
     def nearest(self, t: float) -> int:
@@ -172,6 +176,11 @@ class Case:
     def is_loaded(self, name: str) -> bool:
         """Whether a quantity is made of force."""
         return name in self.mixes or name in POWERS.values()
+
+    @property
+    def splines(self) -> list[Spline]:
+        """What the load has over position."""
+        return [x for x in (self.inertia, self.force) if x is not None and not isinstance(x, Curve)]
 
     @property
     def turns(self) -> bool:

@@ -15,6 +15,8 @@ import numpy as np
 from trajopt.checker.case import certificate_checks, time_checks
 from trajopt.checker.command import FORMAT, REST, command_checks, steps_checks
 from trajopt.checker.float_twin import FloatTwin
+from trajopt.checker.laws import FORMAT as PROFILES
+from trajopt.checker.laws import law_checks
 from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
 from trajopt.checker.reading import Malformed, read
 from trajopt.checker.report import Check, Report, question
@@ -33,6 +35,8 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
     checks = _identity(result, problem)
     if isinstance(result, Mapping) and result.get("format") == FORMAT:
         return replace(_report([*checks, *command_checks(result, notes)], False, strict, notes), tolerance=REST)
+    if isinstance(result, Mapping) and result.get("format") == PROFILES:
+        return _report([*checks, *law_checks(result, notes)], False, strict, notes)
     try:
         case = read(result, notes)
     except Malformed as fault:

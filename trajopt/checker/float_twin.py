@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,10 @@ from trajopt.checker.polynomials import (
     values_at,
 )
 from trajopt.checker.report import Found, Number, to_float
+from trajopt.checker.splines import Spline
+
+LOBATTO: Final = (0.0, (1 - 1 / math.sqrt(5)) / 2, (1 + 1 / math.sqrt(5)) / 2, 1.0)  # where a load over position ...
+SHARES: Final = (1 / 12, 5 / 12, 5 / 12, 1 / 12)  # ... is sampled, and what share of an interval each point stands for
 
 
 class _Pieces(NamedTuple):
@@ -106,15 +110,21 @@ class FloatTwin:
     @cached_property
     def pieces(self) -> _Pieces:
         """The intervals, split at the corners of tables, and one of no length for the last node."""
+        return self.split(np.array(self.case.corners))
+
+    def split(self, times: Array) -> _Pieces:
+        """The intervals, split at times, and one of no length for the last node."""
         time = self.case.time
-        left = np.union1d(time, self.case.corners) if self.case.corners else time
+        left = np.union1d(time, times) if len(times) else time
         interval = np.searchsorted(time, left, side="right") - 1
         return _Pieces(interval, left - time[interval], np.append(np.diff(left), 0.0))
 
     @cached_property
     def one_way(self) -> _Pieces:
-        """The pieces, split where friction changes its direction."""
-        mixed, done = self.pieces, []
+        """The pieces, split where friction changes its direction, and where a load over position changes from one
+        polynomial to the next."""
+        mixed: _Pieces = self.split(np.array([*self.case.corners, *self.knots])) if self.case.splines else self.pieces
+        done = []
         for _ in range(SPLITS if self.case.turns else 0):
             velocity = bernstein(self.rows(1, mixed))
             whole = np.all(velocity >= -self.case.rest, axis=1) | np.all(velocity <= self.case.rest, axis=1)
@@ -125,6 +135,25 @@ class FloatTwin:
         else:
             done.append(mixed)
         return _Pieces(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+
+    @cached_property
+    def knots(self) -> list[float]:
+        """The times (s) at which the axis passes a knot of a load over position."""
+        rows = self.rows(0, self.pieces)
+        bounds = bernstein(rows)
+        found: list[float] = []
+        for spline in self.case.splines:
+            first = np.searchsorted(spline.breaks, np.min(bounds, axis=1))
+            last = np.searchsorted(spline.breaks, np.max(bounds, axis=1))
+            for k in np.flatnonzero(last > first):
+                start, length = self.case.time[self.pieces.interval[k]] + self.pieces.offset[k], self.pieces.length[k]
+                for knot in spline.breaks[first[k] : last[k]]:
+                    row = rows[k].copy()
+                    row[0] -= knot
+                    roots = np.roots(np.trim_zeros(row[::-1], "f"))
+                    real = roots[np.abs(roots.imag) < 1e-9].real
+                    found += [start + length * s for s in real if 0 < s < 1]
+        return found
 
     def pieces_of(self, name: str) -> _Pieces:
         return self.one_way if self.case.is_loaded(name) else self.pieces
@@ -171,8 +200,15 @@ class FloatTwin:
             return product(self.polynomial("force", at_rest)[0], velocity)
         if name != "force":
             a, b = map(float, self.case.mixes[name])
-            return a * self.polynomial("force", at_rest)[0] + b * velocity
+            found = a * self.polynomial("force", at_rest)[0]
+            found[:, : velocity.shape[1]] += b * velocity
+            return found
         inertia, acceleration = self.case.inertia, self.rows(2, self.one_way)
+        if self.case.splines:
+            force = self.rows_along(velocity, acceleration)
+            force[:, 0] += self.friction(velocity, at_rest) if self.case.coulomb else 0.0
+            return force
+        assert isinstance(inertia, Curve)
         force = self.case.viscous * velocity  # of one degree more than acceleration, enough for a linear inertia
         if len(inertia.value) == 1:
             force[:, :-1] += inertia.value[0] * acceleration
@@ -181,6 +217,23 @@ class FloatTwin:
             force += product(np.stack([left, right - left], axis=1), acceleration)
         force[:, 0] += self.friction(velocity, at_rest) if self.case.coulomb else 0.0
         return force
+
+    def rows_along(self, velocity: Array, acceleration: Array) -> Array:
+        """Coefficients of F(q) + J'(q) v²/2 + J(q) a + viscous·v on the pieces of one direction: q(s) put into the
+        polynomials of a spline gives polynomials."""
+        position, inertia = self.rows(0, self.one_way), self.case.inertia
+        parts = [self.case.viscous * velocity]
+        if isinstance(inertia, Curve):
+            parts.append(inertia.value[0] * acceleration)
+        elif inertia is not None:
+            parts.append(product(inertia.along(position), acceleration))
+            parts.append(product(inertia.along(position, 1) / 2, product(velocity, velocity)))
+        if self.case.force is not None:
+            parts.append(self.case.force.along(position))
+        found = np.zeros((len(velocity), max(part.shape[1] for part in parts)))
+        for part in parts:
+            found[:, : part.shape[1]] += part
+        return found
 
     def friction(self, velocity: Array, at_rest: float) -> Array:
         """Coulomb friction on each piece, from the coefficients of its velocity."""
@@ -213,14 +266,44 @@ class FloatTwin:
         instants = self.instants(name)
         if not self.case.is_loaded(name):
             return self.sampled(DERIVATIVES.index(name), instants), instants.weight
+        if self.case.splines:
+            return self.samples_along(name, convention)
         velocity = self.sampled(1, instants)
         friction = self.case.coulomb * friction_signs(velocity, self.case.rest)[convention]
         return self.loaded(name, instants, velocity, friction), instants.weight
 
+    def samples_along(self, name: str, convention: int) -> tuple[Array, Array]:
+        """The same of a load over position, which is sampled at the four Lobatto points of every interval."""
+        whole = _Pieces(np.arange(self.case.count), np.zeros(self.case.count), self.step)
+        powers = np.array(LOBATTO) ** np.arange(self.case.order + 1)[:, None]
+        position, velocity, acceleration = (
+            (rows @ powers[: rows.shape[1]]).ravel() for rows in (self.rows(i, whole) for i in range(3))
+        )
+        friction = self.case.coulomb * friction_signs(velocity, self.case.rest)[convention]
+        force = self.force_along(position, velocity, acceleration) + friction
+        return self.of_force(name, force, velocity), np.outer(self.step, SHARES).ravel()
+
+    def force_along(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """F(q) + J'(q) v²/2 + J(q) a + viscous·v."""
+        inertia, force = self.case.inertia, self.case.viscous * velocity
+        if isinstance(inertia, Curve):
+            force = force + inertia.value[0] * acceleration
+        elif inertia is not None:
+            force = force + inertia.at(position) * acceleration + inertia.at(position, 1) * velocity**2 / 2
+        return force if self.case.force is None else force + self.case.force.at(position)
+
     def loaded(self, name: str, instants: Instants, velocity: Array, friction: Array) -> Array:
-        assert self.case.inertia is not None
-        inertia = self.case.inertia.at(self.case.time[instants.node])
-        force = inertia * self.sampled(2, instants) + self.case.viscous * velocity + friction
+        acceleration = self.sampled(2, instants)
+        if self.case.splines:
+            force = self.force_along(self.sampled(0, instants), velocity, acceleration) + friction
+        else:
+            assert isinstance(self.case.inertia, Curve)
+            inertia = self.case.inertia.at(self.case.time[instants.node])
+            force = inertia * acceleration + self.case.viscous * velocity + friction
+        return self.of_force(name, force, velocity)
+
+    def of_force(self, name: str, force: Array, velocity: Array) -> Array:
+        """What is made of force and velocity."""
         if name in self.case.mixes:
             a, b = map(float, self.case.mixes[name])
             return a * force + b * velocity
@@ -258,14 +341,23 @@ class FloatTwin:
         if not self.case.is_loaded(name):
             return 64 * EPS * self.magnitudes[DERIVATIVES.index(name)]
         assert self.case.inertia is not None
-        inertia = max(abs(value) for value in self.case.inertia.value)
+        inertia = float(max(abs(value) for value in self.case.inertia.value))
         force = inertia * self.magnitudes[2] + self.case.viscous * self.magnitudes[1] + self.case.coulomb
+        force += sum(self.noise_along(spline) for spline in self.case.splines)
         if name in self.case.mixes:
             a, b = map(float, self.case.mixes[name])
             return 64 * EPS * (abs(a) * force + abs(b) * self.magnitudes[1])
         if name == "power":
             return 64 * EPS * force * self.magnitudes[1]
         return 64 * EPS * float(self.drawn_power(name, np.array(force), np.array(self.magnitudes[1])))
+
+    def noise_along(self, spline: Spline) -> float:
+        """How large what a spline adds to force can get, its digits lost in differences of rows included."""
+        size, slope = float(np.max(np.abs(spline.value))), spline.at(spline.position, 1)
+        if spline is self.case.force:
+            return size
+        lost = size / float(np.min(np.diff(spline.position)))
+        return float((np.max(np.abs(slope)) + lost) * self.magnitudes[1] ** 2)
 
     # answers
 
@@ -282,8 +374,15 @@ class FloatTwin:
     def total(self, name: str) -> float:
         """An RMS over the cycle or an energy of the move, with the friction at rest that makes the least of it."""
         least = min(to_float(value) for value in self.metric(name)[:-1])
-        cycle = self.case.end_time + self.case.dwell
-        return least * math.sqrt(self.case.end_time / cycle) if name == "rms_force" else least
+        if name != "rms_force":
+            return least
+        square = least**2 * self.case.end_time + self.held**2 * self.case.dwell
+        return math.sqrt(square / (self.case.end_time + self.case.dwell))
+
+    @property
+    def held(self) -> float:
+        """The force that holds a load over position through the dwell."""
+        return 0.0 if self.case.force is None else float(self.case.force.at(self.case.signal[0][-1:])[0])
 
     def excess_in_total(self, name: str) -> Found:
         limit = self.case.limits[name][1]

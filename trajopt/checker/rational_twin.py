@@ -1,4 +1,7 @@
-"""The rational twin: the sums of the float twin without any rounding."""
+"""The rational twin: the sums of the float twin without any rounding.
+
+What a load over position makes is left to the float twin: when the axis passes a knot of its splines is no fraction.
+"""
 
 from __future__ import annotations
 
@@ -174,7 +177,7 @@ class RationalTwin:
     def polynomial(self, name: str, piece: _Piece, at_rest: float) -> Poly:
         if not self.case.is_loaded(name):
             return self.derivative(DERIVATIVES.index(name), piece)
-        assert self.case.inertia is not None
+        assert isinstance(self.case.inertia, Curve)
         velocity = self.derivative(1, piece)
         force = times(self.line(self.case.inertia, piece), self.derivative(2, piece))
         if self.case.viscous:
@@ -223,7 +226,7 @@ class RationalTwin:
 
     def loaded(self, name: str, node: int, interval: int, resting: int | None) -> Fraction:
         """Force or power at a node; ``resting`` is the sign of friction at rest, None for that of the velocity."""
-        assert self.case.inertia is not None
+        assert isinstance(self.case.inertia, Curve)
         velocity = self.sampled(1, node, interval)
         sign = (velocity > 0) - (velocity < 0)
         if resting is not None and abs(velocity) <= Fraction(self.case.rest):
@@ -252,6 +255,8 @@ class RationalTwin:
 
     def excess(self, name: str, tolerance: float) -> Found:
         """How far a limit is exceeded; where the axis rests, friction may take whatever value keeps the limit."""
+        if self.in_floats(name):
+            return FloatTwin(self.case).excess(name, tolerance)
         found = [Found(Fraction(0))]
         for side, limit, label in zip((-1, 1), self.case.limits[name], ("min", "max"), strict=True):
             if limit is not None:
@@ -259,8 +264,14 @@ class RationalTwin:
                 found.append(ask(name, side, limit, tolerance)._replace(note=label))
         return max(found, key=lambda one: one.violation)
 
+    def in_floats(self, name: str) -> bool:
+        """Whether a quantity is made by a load over position."""
+        return bool(self.case.splines) and self.case.is_loaded(name)
+
     def total(self, name: str) -> Fraction:
         """See `FloatTwin.total`."""
+        if self.case.splines:
+            return Fraction(FloatTwin(self.case).total(name))
         least = min(Fraction(value) for value in self.metric(name)[:-1])
         duration = Fraction(self.case.end_time)
         return least * _root(duration / (duration + Fraction(self.case.dwell))) if name == "rms_force" else least
@@ -312,6 +323,8 @@ class RationalTwin:
         """The value of one term without its weight; a norm we do not know counts as nothing."""
         if name == "time":
             return Fraction(self.case.duration)
+        if self.in_floats(POWERS.get(name, name)):
+            return Fraction(FloatTwin(self.case).term(name, norm, convention)[0])
         values, weights = self.samples(POWERS.get(name, name), convention)
         if name in POWERS:
             weights = [Fraction(self.ticks[1], self.clock)] * len(weights) if self.euler else weights
@@ -335,6 +348,8 @@ class RationalTwin:
     def metric(self, name: str) -> list[Number]:
         """A metric for each convention of friction at rest, and its rounding, none."""
         kind, quantity = metric_of(name)
+        if self.in_floats(quantity):
+            return [*(Fraction(to_float(value)) for value in FloatTwin(self.case).metric(name)[:-1]), 0.0]
         return [*(self.metric_at_nodes if self.euler else self.metric_between)(kind, quantity), 0.0]
 
     def metric_at_nodes(self, kind: str, quantity: str) -> list[Fraction]:

@@ -21,6 +21,7 @@ from trajopt.checker.case import (
     Motor,
     Via,
 )  # fmt: skip
+from trajopt.checker.splines import DEGREE, Spline
 
 FORMAT: Final = "trajopt result 1"
 WITH_SOLUTION: Final = ("SOLVED", "SOLVED_LOCAL")
@@ -33,6 +34,7 @@ _MOTOR: Final = (
 )  # fmt: skip
 _LIMITED: Final = (*DERIVATIVES, *LOADED, *ELECTRICAL, *TOTALS)
 
+_ROUNDING: Final = 1e-9  # of its span: a table that ends so little before the move covers it
 _NUMBERS: Final = ("objective", "duration", "metrics", "trajectory")
 _REQUIRED: Final = ("format", "trajopt", "status", "problem_hash", "problem", *_NUMBERS)
 
@@ -63,42 +65,63 @@ def read(result: Mapping[str, Any], notes: list[str]) -> Case | None:
         raise Malformed("nested too deeply") from None
 
 
-def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
+def stated(problem: Mapping[str, Any], notes: list[str]) -> dict[str, Any]:
+    """What a case takes from its problem alone. Raises Malformed."""
     _finite(problem, "problem")
     known = ("move", "limits", "load", "vibration", "objective", "transcription", "title", "source", "moral", "rotary")
     notes += [f"problem.{key}" for key in problem if key not in known]
     grid = _mapping(problem.get("transcription"), "problem.transcription")
     move = _mapping(problem.get("move"), "problem.move", ("time", "start", "end", "via", "dwell"))
-    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "coulomb", "viscous", *_MOTOR))
+    load = _mapping(problem.get("load", {}), "problem.load", ("inertia", "force", "coulomb", "viscous", *_MOTOR))
     motor = _motor(load)
     mixes = _mixes(motor)
     limits = _limits(problem.get("limits", {}), mixes)
     goal = _mapping(problem.get("objective"), "problem.objective", ("terms", "ceilings"))
     terms, ceilings = _terms(goal.get("terms")), _ceilings(goal.get("ceilings"))
+    inertia, force = _inertia(load.get("inertia")), None
+    if load.get("force") is not None:
+        force = _spline(load["force"], "load.force")
+    for spline in (inertia, force):
+        if isinstance(spline, Spline):
+            _within(spline, limits, grid.get("scheme"))
     mentioned = {*limits, *(name for name, _, _ in (*terms, *ceilings))}
-    order = _order(move, mentioned, grid.get("scheme"))
-    time, signal = _trajectory(result["trajectory"], grid.get("scheme"), order, notes)
-    inertia = None if load.get("inertia") is None else _curve(load["inertia"], "load.inertia")
     if inertia is None and mentioned - {*DERIVATIVES, "time"}:
         raise Malformed("a limit or an objective of force or power needs load.inertia")
     if motor is None and mentioned & {*ELECTRICAL, "brake_energy", "copper_loss", "electrical_energy"}:
         raise Malformed("a limit or an objective of the motor needs load.torque_constant and load.resistance")
+    return {
+        "limits": limits, "inertia": inertia, "force": force,
+        "coulomb": _nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
+        "viscous": _number(load.get("viscous", 0.0), "load.viscous"),
+        "motor": motor, "mixes": mixes, "dwell": _nonnegative(move.get("dwell", 0.0), "move.dwell"),
+        "terms": terms, "ceilings": ceilings, "move_time": _move_time(move.get("time")),
+        "intervals": _whole(grid.get("intervals"), "intervals"),
+        "vibration": _vibration(problem.get("vibration", ())), "rotary": problem.get("rotary") is True,
+    }  # fmt: skip
+
+
+def ends(problem: Mapping[str, Any], order: int) -> tuple[dict[int, float], dict[int, float]]:
+    """The prescribed states at the start and at the end, by derivative."""
+    move = _mapping(problem.get("move"), "problem.move")
+    start = _state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0)
+    return start, _state(move.get("end"), "move.end", order, {}, 0.0)
+
+
+def _solved(result: Mapping[str, Any], problem: Mapping[str, Any], notes: list[str]) -> Case:
+    parts = stated(problem, notes)
+    move, scheme = problem["move"], problem["transcription"].get("scheme")
+    mentioned = {*parts["limits"], *(name for name, *_ in (*parts["terms"], *parts["ceilings"]))}
+    order = _order(move, mentioned, scheme)
+    time, signal = _trajectory(result["trajectory"], scheme, order, notes)
+    start, end = ends(problem, order)
     return Case(
-        scheme=grid["scheme"], order=order, time=time, signal=signal,
-        start=_state(move.get("start", {}), "move.start", order, {"position": 0.0}, 0.0),
-        end=_state(move.get("end"), "move.end", order, {}, 0.0),
-        via=_via(move.get("via", ()), order), limits=limits, inertia=inertia,
-        coulomb=_nonnegative(load.get("coulomb", 0.0), "load.coulomb"),
-        viscous=_number(load.get("viscous", 0.0), "load.viscous"),
-        motor=motor, mixes=mixes, dwell=_nonnegative(move.get("dwell", 0.0), "move.dwell"),
-        terms=terms, ceilings=ceilings, move_time=_move_time(move.get("time")),
-        intervals=_whole(grid.get("intervals"), "intervals"),
+        scheme=scheme, order=order, time=time, signal=signal, start=start, end=end, **parts,
+        via=_via(move.get("via", ()), order),
         objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
         metrics={
             str(name): _number(value, f"metrics.{name}")
             for name, value in _mapping(result["metrics"], "metrics").items() if value is not None
         },
-        vibration=_vibration(problem.get("vibration", ())), rotary=problem.get("rotary") is True,
         **_certificate(result.get("certificate")),
     )  # fmt: skip
 
@@ -175,6 +198,31 @@ def _curve(value: Any, where: str) -> Curve:
     if len(times) != len(values) or len(times) == 0 or not np.all(np.diff(times) > 0):
         raise Malformed(f"{where} is no table: as many values as times, and times must increase")
     return Curve(tuple(times.tolist()), tuple(values.tolist()))
+
+
+def _inertia(value: Any) -> Curve | Spline | None:
+    if isinstance(value, Mapping) and "position" in value:
+        return _spline(value, "load.inertia")
+    return None if value is None else _curve(value, "load.inertia")
+
+
+def _spline(value: Any, where: str) -> Spline:
+    table = _mapping(value, where, ("position", "value"))
+    position, values = (_vector(table.get(key), f"{where}.{key}") for key in ("position", "value"))
+    if len(position) != len(values) or len(position) <= DEGREE or not np.all(np.diff(position) > 0):
+        raise Malformed(f"{where} is no table: {DEGREE + 1} rows or more, and positions must increase")
+    return Spline(position, values)
+
+
+def _within(spline: Spline, limits: Mapping[str, tuple[Curve | None, Curve | None]], scheme: Any) -> None:
+    """A load over position is known within its table only, and between the nodes of the exact scheme."""
+    low, high = limits.get("position", (None, None))
+    first, last = float(spline.position[0]), float(spline.position[-1])
+    room = _ROUNDING * (last - first)
+    if low is None or high is None or min(low.value) < first - room or max(high.value) > last + room:
+        raise Malformed("a load over position needs limits.position within its table")
+    if scheme != "exact":
+        raise Malformed("a load over position needs the exact scheme")
 
 
 def _motor(load: Mapping[str, Any]) -> Motor | None:

@@ -24,6 +24,7 @@ _COLUMNS: Final = {
 }  # fmt: skip
 _PRINTED: Final = 1e-15
 _COMPUTED: Final = 1e-12  # of the largest, for what the result does not hold and rounding moves
+_ALONG: Final = 1e-9  # the same where it hangs on the slope of a spline
 
 
 class CheckerInputError(ValueError):
@@ -106,7 +107,7 @@ def table_fault(path: Path, case: Case | None, notes: list[str]) -> str:
         return f"needs one column each of {columns}; its header is {shown(','.join(header))}"
     if any(len(row) != len(header) for row in rows):
         return "is truncated: a row has more or fewer cells than the header"
-    return _column_faults(rows, found, expected)
+    return _column_faults(rows, found, expected, along=bool(case.splines))
 
 
 def _unit(name: str, length: str) -> str:
@@ -131,7 +132,9 @@ def _columns(case: Case) -> tuple[Array, ...]:
     return (*case.signal[:-1], np.append(top, 0.0 if case.scheme == "euler" else top[-1]))
 
 
-def _column_faults(rows: list[list[str]], names: list[str | None], expected: Mapping[str, list[Array]]) -> str:
+def _column_faults(
+    rows: list[list[str]], names: list[str | None], expected: Mapping[str, list[Array]], along: bool
+) -> str:
     for column, name in enumerate(names):
         if name is None:
             continue
@@ -141,7 +144,7 @@ def _column_faults(rows: list[list[str]], names: list[str | None], expected: Map
             return f"column {name}: {error}"
         off = np.min([np.abs(given - wanted) for wanted in expected[name]], axis=0)
         largest = max(float(np.max(np.abs(wanted))) for wanted in expected[name])
-        computed = _COMPUTED * largest if name in LOADED else 0.0
+        computed = (_ALONG if along else _COMPUTED) * largest if name in LOADED else 0.0
         differs = ~(off <= _PRINTED * np.abs(expected[name][0]) + computed)
         if np.any(differs):
             k = int(np.argmax(differs))
