@@ -17,7 +17,7 @@ _HOMES = {
     "from_dict": "trajopt.problem_file",
     "solve": "trajopt.worker",
     "route": "trajopt.routing",
-    "synchronise": "trajopt.axes",
+    "synchronise": "trajopt.axes.synchronise",
     "check": "trajopt.checker",
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",
@@ -31,6 +31,7 @@ _HOMES = {
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
     "Envelope": "trajopt.envelope",
+    **dict.fromkeys(("sin", "cos"), "trajopt.elementwise"),
     **dict.fromkeys(("Norm", "L1", "L2", "Linf"), "norms"),
 }
 

@@ -25,6 +25,7 @@ _OPTIONS: Final = {
     "print_level": 0,
     "sb": "yes",
 }
+ELEMENTWISE: Final = {"sin": np.frompyfunc(pyo.sin, 1, 1), "cos": np.frompyfunc(pyo.cos, 1, 1)}
 _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: they prove nothing
     0: Claim.OPTIMAL,
     1: Claim.OPTIMAL,  # acceptable, which is set to 1e-8
