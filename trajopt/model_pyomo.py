@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 import pyomo.environ as pyo
+from pyomo.common.modeling import unique_component_name
 
 from trajopt.errors import MissingSolver
 from trajopt.model import Claim, Floats, Outcome, Prices, own_size
@@ -68,7 +69,8 @@ class NonconvexModel:
                 self._named.append((f"{name}.{side}", some, size, at[active], own_size(bound[active], size)))
 
     def _add(self, variables: Any, count: int, size: float, name: str = "") -> Any:
-        self._model.add_component(name or f"x{len(self._vectors)}", variables)
+        name = unique_component_name(self._model, name or "x")  # axes have variables of one name
+        self._model.add_component(name, variables)
         x = np.empty(count, dtype=object)
         x[:] = [size * variables[k] for k in range(count)]
         self._vectors.append((x, variables, size))
@@ -108,7 +110,8 @@ class NonconvexModel:
         return np.concatenate(parts)
 
     def total(self, weights: Floats, x: Any) -> Any:
-        return pyo.quicksum(float(w) * y for w, y in zip(weights, x, strict=True))
+        plain = (float(w) if isinstance(w, float) else w for w in weights)  # pyomo is slow on numpy's floats
+        return pyo.quicksum(w * y for w, y in zip(plain, x, strict=True))
 
     def squares(self, x: Any) -> Any:
         return x * x

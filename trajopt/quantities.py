@@ -129,7 +129,7 @@ class Quantities:
 
     def _force(self) -> Signal:
         load, model = self.problem.load, self.model
-        force = signals.product(model, self._inertia(), self.signal("acceleration"))
+        force = self._inertial()
         velocity = self.signal("velocity")
         if load.viscous:
             viscous = signals.constant(load.viscous, self.mesh.intervals)
@@ -137,6 +137,10 @@ class Quantities:
         if load.coulomb:
             force = signals.plus(model, force, self._coulomb(velocity))
         return force
+
+    def _inertial(self) -> Signal:
+        """What it takes to accelerate the load."""
+        return signals.product(self.model, self._inertia(), self.signal("acceleration"))
 
     def _inertia(self) -> Signal:
         inertia = self.problem.load.inertia
@@ -154,6 +158,16 @@ class Quantities:
 
     def _power(self) -> Signal:
         return signals.product(self.model, self._force(), self.signal("velocity"))
+
+
+@dataclass(frozen=True)
+class Driven(Quantities):
+    """The quantities of a joint of an arm, whose ``torque`` follows from the motion of all joints."""
+
+    torque: Signal
+
+    def _inertial(self) -> Signal:
+        return self.torque
 
 
 def is_affine(problem: Problem, name: str) -> bool:
