@@ -18,6 +18,7 @@ from trajopt.errors import BadInput
 from trajopt.fields import nearest
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
 LARGEST_FILE: Final = 1_000_000  # bytes
@@ -31,6 +32,7 @@ _TOKEN: Final = re.compile(
 )
 _EXAMPLES: Final = {  # what to write for what is missing
     "move": 'write [move] with time = "1 s" and end = { position = "0.25 m" }',
+    "axes": 'write [[axes]] with name = "x" and move.end = { position = "0.25 m" }',
     "move.time": 'write time = "1 s", or "free"',
     "move.end": 'write end = { position = "0.25 m" }',
     "move.via.time": 'write { time = "0.5 s", position = "0.1 m" }',
@@ -53,7 +55,7 @@ _ALIASES: Final = {
 }
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem:
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem | AxesProblem:
     """The problem in a TOML file, or of a ready-made problem's name, with ``key=value`` overrides applied.
 
     Raises BadInput with one line naming the file, the field and the remedy.
@@ -62,7 +64,7 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
     return parse(read_text(source), overrides, name=str(path))
 
 
-def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem:
+def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.Problem | PlantProblem | AxesProblem:
     """The problem stated by a TOML text. Raises BadInput."""
     _refuse_marks(text, name)
     _refuse_deep(text, name)
@@ -75,10 +77,12 @@ def parse(text: str, overrides: Sequence[str] = (), name: str = "problem") -> p.
     return from_dict(data, name)
 
 
-def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem:
+def from_dict(data: dict[str, Any], name: str = "problem") -> p.Problem | PlantProblem | AxesProblem:
     """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
     if "plant" in data:
         return _plant(data, name)
+    if "axes" in data or "arm" in data:
+        return _axes(data, name)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
@@ -98,6 +102,28 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
         return PlantProblem.model_validate(data, context={"texts_only": True})
     except ValidationError as error:
         raise _refused(name, explain(error, PlantProblem)) from None
+
+
+def _axes(data: dict[str, Any], name: str) -> AxesProblem:
+    """Several axes: each read as a problem of one is, and on an arm in angles unless it says otherwise."""
+    from trajopt.axes.problem import AxesProblem
+
+    for key in ("limits", "load", "vibration", "rotary"):
+        if key in data:
+            raise _refused(name, f"{key}: belongs to each of the axes; write it below [[axes]]")
+    axes = data.get("axes")
+    if isinstance(axes, list):
+        arm = {"rotary": True} if "arm" in data else {}
+        data = data | {"axes": [_axis({**arm, **x}, name) if isinstance(x, dict) else x for x in axes]}
+    try:
+        return AxesProblem.model_validate(data, context={"rotary": False, "texts_only": True})
+    except ValidationError as error:
+        raise _refused(name, explain(error, AxesProblem)) from None
+
+
+def _axis(data: dict[str, Any], name: str) -> dict[str, Any]:
+    data = {section: _renamed(section, value, name) for section, value in data.items()}
+    return {"rotary": _rotary(data), **data}
 
 
 def read_text(path: Path) -> str:
@@ -281,8 +307,9 @@ def explain(error: ValidationError, root: type[BaseModel] = p.Problem) -> str:
     if kind.startswith("string"):
         return f"{field}: must be a text in quotes, got {got}"
     message = first["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
-    below = re.match(r"[a-z][\w.\[\]]*: ", message)  # it names a field below the one that pydantic knows
-    return f"{field}{'.' if below else ': '}{message}" if field else message
+    below = re.match(r"[a-z\[][\w.\[\]]*: ", message)  # it names a field below the one that pydantic knows
+    joint = "" if message.startswith("[") else "." if below else ": "
+    return f"{field}{joint}{message}" if field else message
 
 
 def _meant(loc: Sequence[int | str], root: type[BaseModel]) -> str:
