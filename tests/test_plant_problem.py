@@ -280,7 +280,7 @@ def test_time_limit_and_death_of_the_process(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_plants_are_not_synchronised() -> None:
-    with pytest.raises(trajopt.BadInput, match="only moves of axes"):
+    with pytest.raises(trajopt.BadInput, match="takes moves of one axis each"):
         trajopt.synchronise([two_masses()])
 
 

@@ -28,6 +28,11 @@ _HOMES = {
     ),
     **dict.fromkeys(("PlantProblem", "PlantSection", "Robust"), "trajopt.plant.problem"),
     "PlantSolution": "trajopt.plant.solution",
+    **dict.fromkeys(
+        ("AxesProblem", "Axis", "AxisMove", "Together", "AxesTerm", "AxesObjective", "Search"), "trajopt.axes.problem"
+    ),
+    **dict.fromkeys(("ArmSection", "Tip", "Line"), "trajopt.axes.arm"),
+    "AxesSolution": "trajopt.axes.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
     "Envelope": "trajopt.envelope",

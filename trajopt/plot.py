@@ -75,8 +75,8 @@ def plot(solution: Solution) -> Panels:
         axes.plot(time, values, color=COLOURS[0], linewidth=1.6, label=name)
         _finish(axes, name, [trajectory])
     _mark_arcs(panels, solution.structure)
-    _title(panels, solution.problem.title or "Trajectory", pad=18)
-    _note(panels[0], f"minimised {_pretty(objective_text(solution))}", "left", 8)
+    headline(panels, solution.problem.title or "Trajectory", pad=18)
+    note(panels[0], f"minimised {pretty(objective_text(solution))}", "left", 8)
     return panels
 
 
@@ -158,7 +158,7 @@ def compare(
         _finish(axes, name, shown)
     _legend(panels, len(solid), len(second))
     if title:
-        _title(panels, title, pad=8)
+        headline(panels, title, pad=8)
     return panels
 
 
@@ -222,22 +222,27 @@ def _panels(names: list[str], trajectory: Trajectory) -> Panels:
     figure = Figure(figsize=(7.0, 1.0 + 1.35 * len(names)), layout="constrained", facecolor="white")
     panels = Panels(figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0])
     for axes, name in zip(panels, names, strict=True):
-        axes.set_ylabel(f"{kinds[name].name}\n[{_pretty(kinds[name].unit)}]", fontsize=8)
-        axes.tick_params(labelsize=8, color=GREY)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.spines[["left", "bottom"]].set_color(GREY)
-        axes.grid(color="0.92", linewidth=0.7)
-        axes.set_axisbelow(True)
+        axes.set_ylabel(f"{kinds[name].name}\n[{pretty(kinds[name].unit)}]", fontsize=8)
+        dress(axes)
     panels[-1].set_xlabel("time [s]", fontsize=8)
     figure.align_ylabels(panels)
     return panels
 
 
-def _title(panels: Panels, text: str, pad: float) -> None:
+def dress(axes: Axes) -> None:
+    """The look of every panel: a light grid, no frame, small ticks."""
+    axes.tick_params(labelsize=8, color=GREY)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+    axes.grid(color="0.92", linewidth=0.7)
+    axes.set_axisbelow(True)
+
+
+def headline(panels: Panels, text: str, pad: float) -> None:
     panels[0].set_title("\n".join(textwrap.wrap(text, 70)), loc="left", fontsize=11, fontweight="bold", pad=pad)
 
 
-def _pretty(unit: str) -> str:
+def pretty(unit: str) -> str:
     return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
 
 
@@ -266,8 +271,8 @@ def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(0.0, max(trajectory.duration for trajectory in trajectories))
     if far:
-        unit = _pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
-        _note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
+        unit = pretty(units.kinds(trajectories[0].problem.rotary)[name].unit)
+        note(axes, f"limit off scale: {_numbers(far)} {unit}", "right", 7)
 
 
 def _numbers(values: list[float]) -> str:
@@ -277,7 +282,7 @@ def _numbers(values: list[float]) -> str:
     return ", ".join(f"{x:.4g}" for x in values)
 
 
-def _note(axes: Axes, text: str, side: Literal["left", "right"], size: float) -> None:
+def note(axes: Axes, text: str, side: Literal["left", "right"], size: float) -> None:
     """A line of small print above a panel."""
     x = 0.0 if side == "left" else 1.0
     axes.annotate(text, (x, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", ha=side, va="bottom",

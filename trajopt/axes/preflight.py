@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from trajopt.problem import FREE
 
@@ -20,6 +23,8 @@ def refuse_contradictions(problem: AxesProblem) -> None:
         _arm(problem)
         _tip(problem)
     moves = problem.moves  # each refuses what is wrong with one axis
+    if problem.release is not None:
+        _speed(problem)
     if problem.coupled and len({move.order for move in moves}) > 1:
         orders = ", ".join(f"{move.title} {('acceleration', 'jerk', 'snap')[move.order - 2]}" for move in moves)
         raise ValueError(f"axes: coupled ones need one top derivative, got {orders}; limit the same derivatives")
@@ -89,6 +94,33 @@ def _release(problem: AxesProblem, time: float) -> None:
     if problem.transcription.scheme == "euler" and abs(steps - round(steps)) > 1e-9:
         step = duration / problem.transcription.intervals
         raise ValueError(f"tip.release: {time:g} s must be a multiple of the euler step {step:g} s")
+
+
+def _speed(problem: AxesProblem) -> None:
+    """Refuse a tip speed that no motion can have, and one that the arm cannot have in the pose that is prescribed."""
+    from trajopt.axes.explain import closed_bound
+
+    assert problem.tip is not None and problem.tip.velocity is not None
+    asked, bound = hypot(*problem.tip.velocity), closed_bound(problem)
+    if asked > bound * (1 + 1e-9):
+        raise ValueError(
+            f"tip.velocity: {asked:g} m/s is beyond {bound:.6g} m/s, which no motion exceeds within the limits of the"
+            " joints and the time; ask for less, or widen the limits or the time"
+        )
+    pose = [move.move.end.position for move in problem.moves]
+    if problem.release != "end" or not all(isinstance(x, float) for x in pose):
+        return
+    q = [np.array([x]) for x in pose]
+    units = np.eye(len(q))
+    jacobian = np.array([[x[0] for x in problem.dynamics.tip_velocity(q, list(row[:, None]))] for row in units]).T
+    wanted = np.array(problem.tip.velocity)
+    missed = wanted - jacobian @ np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0]
+    if hypot(*missed) > 1e-6 * max(asked, 1e-12):
+        shown = ", ".join(f"{x:.6g}" for x in pose if isinstance(x, float))
+        raise ValueError(
+            f"tip.velocity: the arm is singular in the end pose ({shown}) rad, where no joint speeds move its tip that"
+            " way; bend it, or leave the end free"
+        )
 
 
 def _straight(problem: AxesProblem) -> None:

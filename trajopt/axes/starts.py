@@ -65,8 +65,10 @@ class Guess:
 
 def _derivative(curve: Any, i: int, t: Floats) -> Floats:
     if isinstance(curve, BPoly):
-        return np.asarray(curve(t) if i == 0 else curve.derivative(i)(t))
-    return np.asarray(curve.at(np.minimum(t, curve.duration))[DERIVATIVES[i]])
+        values: Floats = np.asarray(curve(t) if i == 0 else curve.derivative(i)(t))
+        return values
+    found: dict[str, Floats] = curve.at(np.minimum(t, curve.duration))
+    return found[DERIVATIVES[i]]
 
 
 def guesses(problem: AxesProblem) -> Iterator[Guess]:
@@ -125,7 +127,7 @@ def _pose(problem: AxesProblem, time: float, rng: np.random.Generator) -> tuple[
 
 
 def swing_speed(move: Problem, q: float, w: float, time: float) -> float:
-    """The speed (rad/s) that a joint reaches at ``q``, in the direction of ``w``, from rest at the far end of its range.
+    """The speed (rad/s) of a joint at ``q``, in the direction of ``w``, from rest at the far end of its range.
 
     w³ = 4.5 J s² under a jerk J, w² = 2 a s under an acceleration a, and w itself at most what is allowed.
     """

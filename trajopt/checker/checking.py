@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from trajopt.checker.axes import FORMAT as AXES
+from trajopt.checker.axes import axes_checks
 from trajopt.checker.case import certificate_checks, time_checks
 from trajopt.checker.command import FORMAT, REST, command_checks, steps_checks
 from trajopt.checker.float_twin import FloatTwin
@@ -31,6 +33,9 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
     checks = _identity(result, problem)
     if isinstance(result, Mapping) and result.get("format") == FORMAT:
         return replace(_report([*checks, *command_checks(result, notes)], False, strict, notes), tolerance=REST)
+    if isinstance(result, Mapping) and result.get("format") == AXES:
+        decided, rational = axes_checks(result, strict, notes)
+        return _report([*checks, *decided], rational, strict, notes)
     try:
         case = read(result, notes)
     except Malformed as fault:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.plant.command import Command
-from trajopt.plot import COLOURS, GREY, SHADE, Panels
+from trajopt.plot import COLOURS, GREY, SHADE, Panels, dress
 
 if TYPE_CHECKING:
     from trajopt.plant.solution import PlantSolution
@@ -41,7 +41,7 @@ def plot(solution: PlantSolution) -> Panels:
             axes.axhline(limit, color=GREY, linewidth=0.9, linestyle=_DASHES, zorder=1.5)
         axes.axvline(command.duration, color=GREY, linewidth=0.7)
         axes.set_ylabel(label, fontsize=8)
-        _finish(axes)
+        dress(axes)
     panels[-1].set_xlim(-0.02 * command.duration, command.duration + rest)
     panels[-1].set_xlabel("time [s]", fontsize=8)
     figure.align_ylabels(panels)
@@ -76,7 +76,7 @@ def plot_vibration(solution: PlantSolution, frequency: Any = None, damping: floa
     axes.set_xlim(0.0, float(np.max(frequency)))
     axes.set_xlabel(f"undamped frequency of the mode [Hz], damping ratio {damping:.3g}", fontsize=8)
     axes.set_ylabel("vibration left [%]", fontsize=8)
-    _finish(axes)
+    dress(axes)
     title = solution.problem.title or "Residual vibration"
     axes.set_title("\n".join(textwrap.wrap(title, 70)), loc="left", fontsize=11, fontweight="bold")
     return axes
@@ -87,11 +87,3 @@ def _shade(axes: Axes, command: Command) -> None:
     for start, end, level in zip(ends, ends[1:], command.levels, strict=False):
         if level == command.umax:
             axes.axvspan(float(start), float(end), facecolor=SHADE, alpha=0.25, linewidth=0, zorder=0.5)
-
-
-def _finish(axes: Axes) -> None:
-    axes.tick_params(labelsize=8, color=GREY)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.set_axisbelow(True)
