@@ -56,19 +56,20 @@ class Guess:
         """(N+1,) the times of the nodes, s: the release falls on its own."""
         fractions, node = setting.mesh.fractions, setting.release
         if node is None or self.release is None or node == setting.mesh.intervals:
-            return np.asarray(fractions * self.duration)
+            return fractions * np.float64(self.duration)
         share = fractions[node]
         before = fractions[: node + 1] / share * self.release
         after = self.release + (fractions[node + 1 :] - share) / (1 - share) * (self.duration - self.release)
-        return np.minimum(np.concatenate([before, after]), self.duration)
+        found: Floats = np.minimum(np.concatenate([before, after]), self.duration)
+        return found
 
 
 def _derivative(curve: Any, i: int, t: Floats) -> Floats:
     if isinstance(curve, BPoly):
         values: Floats = np.asarray(curve(t) if i == 0 else curve.derivative(i)(t))
         return values
-    found: dict[str, Floats] = curve.at(np.minimum(t, curve.duration))
-    return found[DERIVATIVES[i]]
+    sampled: dict[str, Floats] = curve.at(np.minimum(t, curve.duration))
+    return sampled[DERIVATIVES[i]]
 
 
 def guesses(problem: AxesProblem) -> Iterator[Guess]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +35,7 @@ from trajopt.checker.reading import (
     shown,
 )
 from trajopt.checker.report import Check, question, to_float
+from trajopt.checker.result_file import _text as read_text
 
 FORMAT: Final = "trajopt axes 1"
 BETWEEN: Final = 1e-3  # of a limit on torque or power, which is held at the nodes
@@ -42,6 +44,7 @@ _TIP: Final = 1e-6
 _DEGREE: Final = 8  # of the polynomials through torque
 _SMOOTH: Final = 1e-7  # of the peak: what they may miss it by
 _TIME: Final = 1e-12
+_PRINTED: Final = 1e-15
 _NUMBERS: Final = ("objective", "duration", "metrics", "axes")
 _KNOWN: Final = ("move", "axes", "arm", "tip", "objective", "transcription", "search", "title", "source", "moral")
 
@@ -387,3 +390,36 @@ def _on_the_line(moved: Moved, line: Mapping[str, Any], q: Array, w: Array) -> l
 def _of_the_certificate(result: Mapping[str, Any], moved: Moved, notes: list[str]) -> list[Check]:
     found = _certificate(result.get("certificate"))
     return certificate_checks(replace(moved.cases[0], objective=moved.objective, **found), notes)
+
+
+def motion_table_fault(path: Path, result: Mapping[str, Any]) -> str:
+    """What a trajectory.csv says otherwise than the result of several axes; empty when it says the same. The columns of
+    axes whose nodes are not all nodes are not compared."""
+    try:
+        with np.errstate(all="ignore"):
+            moved = _read(result, [])
+        rows = [row.split(",") for row in read_text(path).splitlines() if row and not row.startswith("#")]
+        given = np.array([[float(cell) for cell in row] for row in rows[1:]])
+    except (ValueError, OverflowError, RecursionError) as error:
+        return f"cannot be compared: {error}"
+    if moved is None:
+        return "carries numbers although the result is no solution"
+    time = np.unique(np.concatenate([case.time for case in moved.cases]))
+    names = [cell.partition(" ")[0] for cell in rows[0]]
+    if given.shape != (len(time), len(names)) or len(set(names)) != len(names):
+        return f"has {len(given)} rows where {len(time)} belong, or ragged or repeated columns"
+    for name, wanted in _columns(moved, time).items():
+        if name not in names:
+            return f"has no column {name}"
+        found = given[:, names.index(name)]
+        if not np.all(np.abs(found - wanted) <= _PRINTED * np.abs(wanted)):
+            return f"column {name} has other numbers than the result"
+    return ""
+
+
+def _columns(moved: Moved, time: Array) -> dict[str, Array]:
+    found = {"time": time}
+    for name, case in zip(moved.names, moved.cases, strict=True):
+        if len(case.time) == len(time):
+            found |= {f"{name}.{DERIVATIVES[i]}": case.signal[i] for i in range(case.order)}
+    return found

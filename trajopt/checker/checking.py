@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.checker.axes import FORMAT as AXES
-from trajopt.checker.axes import axes_checks
+from trajopt.checker.axes import axes_checks, motion_table_fault
 from trajopt.checker.case import certificate_checks, time_checks
 from trajopt.checker.command import FORMAT, REST, command_checks, steps_checks
 from trajopt.checker.float_twin import FloatTwin
@@ -64,6 +64,8 @@ def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None =
     if Path(path).name != "result.json" or not os.path.lexists(table):
         return report
     notes: list[str] = []
+    if result.get("format") == AXES:
+        return replace(report, checks=(*report.checks, question("trajectory.csv", motion_table_fault(table, result))))
     try:
         case = read(result, notes)
         fault = table_fault(table, case, notes)
