@@ -111,6 +111,8 @@ def _axes(data: dict[str, Any], name: str) -> AxesProblem:
     for key in ("limits", "load", "vibration", "rotary"):
         if key in data:
             raise _refused(name, f"{key}: belongs to each of the axes; write it below [[axes]]")
+    if "tip" in data and "arm" not in data:
+        raise _refused(name, 'tip: needs an arm; write [arm] with kind = "scara"')
     axes = data.get("axes")
     if isinstance(axes, list):
         arm = {"rotary": True} if "arm" in data else {}
@@ -118,7 +120,7 @@ def _axes(data: dict[str, Any], name: str) -> AxesProblem:
     try:
         return AxesProblem.model_validate(data, context={"rotary": False, "texts_only": True})
     except ValidationError as error:
-        raise _refused(name, explain(error, AxesProblem)) from None
+        raise _refused(name, _as_written(explain(error, AxesProblem), data)) from None
 
 
 def _axis(data: dict[str, Any], name: str) -> dict[str, Any]:

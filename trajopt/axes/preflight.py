@@ -15,13 +15,12 @@ if TYPE_CHECKING:
 
 def refuse_contradictions(problem: AxesProblem) -> None:
     """Raise ValueError for a problem that cannot be meant as it stands."""
-    _objective(problem)
-    if problem.arm is None:
-        if problem.tip is not None:
-            raise ValueError('tip: needs an [arm]; write [arm] with kind = "scara"')
-    else:
+    if problem.arm is None and problem.tip is not None:
+        raise ValueError('tip: needs an arm; write [arm] with kind = "scara"')
+    if problem.arm is not None:
         _arm(problem)
         _tip(problem)
+    _objective(problem)
     moves = problem.moves  # each refuses what is wrong with one axis
     if problem.release is not None:
         _speed(problem)
