@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from trajopt import units
+from trajopt import table, units
 from trajopt.axes.motion import Motion
 from trajopt.mesh import Floats
 from trajopt.trajectory import Trajectory
@@ -17,26 +17,27 @@ def frame(motion: Motion) -> pd.DataFrame:
     """One row a node of any axis; see `trajopt.axes.solution.AxesSolution.frame`."""
     time = np.unique(np.concatenate([axis.time for axis in motion.axes]))
     columns, named = {"time": time}, {"time": "s"}
-    for axis, (name, values) in zip(motion.axes, motion.at(time).items(), strict=True):
+    for axis, stated in zip(motion.axes, motion.problem.axes, strict=True):
         kinds = units.kinds(axis.problem.rotary)
-        found = dict(values)
-        if axis.problem.load.inertia is not None:
-            found |= {key: sampled(axis, key, time) for key in ("force", "power")}
-        columns |= {f"{name}.{key}": x for key, x in found.items()}
-        named |= {f"{name}.{key}": kinds[key].unit for key in found}
+        for key, values in _columns(axis, time).items():
+            columns[f"{stated.name}.{key}"], named[f"{stated.name}.{key}"] = values, kinds[key].unit
     if motion.problem.reaches:
-        columns |= {f"tip.{key}": x for key, x in motion.tip(time).items()}
+        columns |= {f"tip.{key}": values for key, values in motion.tip(time).items()}
         named |= {f"tip.{key}": unit for key, unit in _TIP.items()}
-    table = pd.DataFrame(columns)
-    table.attrs["units"] = named
-    return table
+    found = pd.DataFrame(columns)
+    found.attrs["units"] = named
+    return found
 
 
-def sampled(axis: Trajectory, name: str, time: Floats) -> Floats:
-    """A quantity of an axis at times (s): at nodes as it is there, between them on its polynomial (Euler: a line)."""
+def _columns(axis: Trajectory, time: Floats) -> dict[str, Floats]:
+    """The columns of one axis at times (s): those of its own table where they are its nodes."""
+    if len(time) == len(axis.time):
+        own = table.frame(axis)
+        return {str(key): own[key].to_numpy() for key in own.columns if key != "time"}
     from trajopt.plot import curve
 
-    signal = axis.signal(name)
-    if signal.nodes is not None and len(time) == len(axis.time) and np.all(time == axis.time):
-        return np.asarray(signal.nodes)
-    return np.interp(time, *curve(axis, name))
+    within = np.minimum(time, axis.duration)
+    found = axis.at(within)
+    if axis.problem.load.inertia is not None:
+        found |= {name: np.interp(within, *curve(axis, name)) for name in ("force", "power")}
+    return found
