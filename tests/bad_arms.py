@@ -104,8 +104,8 @@ _REPLACED: Final = (
     ("both", "[tip]", f"[tip]\n{_LINE}", ("tip: give either velocity", "or line")),
 )  # fmt: skip
 _LINES: Final = (
-    ("start", '"-0.2 m"', '"-0.9 m"', ("tip: (0.5, -0.9) m", "out of reach: 0.1 to 0.7 m", "move it inside")),
-    ("inner", '["0.3 m", "0.4 m"]', '["-0.5 m", "0.2 m"]', ("tip.line: comes within", "reaches 0.1 m at least")),
+    ("start", '"-0.2 m"', '"-0.9 m"', ("tip.line: is 1.02956 m from the first", "0.1 to 0.7 m", "move it inside")),
+    ("inner", '["0.3 m", "0.4 m"]', '["-0.5 m", "0.2 m"]', ("tip.line: is 0 m", "out of reach: 0.1 to 0.7 m")),
     ("point", '["0.3 m", "0.4 m"]', '["0.5 m", "-0.2 m"]', ("tip.line", "one point")),
     ("width", '"1 mm"', '"0 mm"', ("tip.line.width: must be > 0",)),
 )
@@ -120,6 +120,11 @@ def _cases() -> Iterator[Bad]:
     line = THROW.replace('velocity = ["0 m/s", "12.5 m/s"]', _LINE)
     for name, old, new, words in _LINES:
         yield Bad(f"line-{name}", words, line.replace(old, new))
+    curve = 'curve = { x = ["0.5 m"], y = ["0 m", "9 m"], width = "1 mm" }'
+    bent = THROW.replace('velocity = ["0 m/s", "12.5 m/s"]', curve)
+    yield Bad("curve-reach", ("tip.curve: is 9.01388 m from the first joint at 1 of its way",), bent)
+    yield Bad("curve-still", ("tip.curve: x and y do not depend on s",), bent.replace('"0 m", "9 m"', '"0 m"'))
+    yield Bad("curve-empty", ("tip.curve.x: needs 1 to 16 coefficients",), bent.replace('["0.5 m"]', "[]"))
     stretched = THROW.replace('move.end = "free"', 'move.end = { position = "0 rad", velocity = "free" }')
     singular = ("tip.velocity: the arm is singular in the end pose (0, 0) rad", "bend it")
     yield Bad("arm-singular", singular, stretched, ("tip.velocity=['12.5 m/s', '0 m/s']",))

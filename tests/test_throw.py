@@ -154,7 +154,7 @@ def test_an_edited_result_does_not_pass(
 
 def test_files_figures_and_pickles(throw: trajopt.AxesSolution, tmp_path: Path) -> None:
     written = throw.save(tmp_path)
-    assert [path.name for path in written] == ["result.json", "trajectory.csv", "motion.png"]
+    assert [path.name for path in written] == ["result.json", "trajectory.csv", "motion.png", "poses.png", "tip.png"]
     assert trajopt.check_file(written[0], throw.problem.canonical()).passed
     text = written[1].read_text()
     written[1].write_text(text.replace(text.splitlines()[60].split(",")[2], "0.125"))
@@ -242,6 +242,17 @@ def test_a_tip_on_a_straight_line_elbow_up_and_down() -> None:
         (x0, y0), (x1, y1) = line.start, line.end
         off = ((tip["x"] - x0) * (y1 - y0) - (tip["y"] - y0) * (x1 - x0)) / np.hypot(x1 - x0, y1 - y0)
         assert np.max(np.abs(off)) <= 0.51 * line.width and np.all(sign * joint > 0)
+
+
+def test_a_tip_along_a_curve() -> None:
+    problem = changed(trajopt.load("scara_straight_line"), starts=2, intervals=40)
+    curve = trajopt.Curve(x=(0.5, 0.1, -0.25), y=(-0.2, 0.6), width=2e-3)
+    solution = solved(problem.replace(tip=trajopt.Tip(curve=curve)))
+    tip = solution.moved().tip(np.linspace(0, solution.duration, 200))
+    s = (tip["y"] + 0.2) / 0.6
+    assert np.max(np.abs(tip["x"] - (0.5 + 0.1 * s - 0.25 * s**2))) <= 1.5e-3  # the distance is a little less
+    off = _edited(solution.to_dict(), ("problem", "tip", "curve", "x", 2), lambda x: x - 0.01)
+    assert any(check.name.startswith("path") for check in trajopt.check(off).failed)
 
 
 def test_three_links_throw_too() -> None:

@@ -31,7 +31,7 @@ _HOMES = {
     **dict.fromkeys(
         ("AxesProblem", "Axis", "AxisMove", "Together", "AxesTerm", "AxesObjective", "Search"), "trajopt.axes.problem"
     ),
-    **dict.fromkeys(("ArmSection", "Tip", "Line"), "trajopt.axes.arm"),
+    **dict.fromkeys(("ArmSection", "Tip", "Line", "Curve"), "trajopt.axes.arm"),
     "AxesSolution": "trajopt.axes.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),

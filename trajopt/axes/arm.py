@@ -14,6 +14,7 @@ from trajopt.problem_file import explain
 from trajopt.units import shown
 
 MOST_LINKS: Final = 12
+MOST_POWERS: Final = 16
 
 
 def _each(kind: str, rotary: bool = False, above: bool = True) -> BeforeValidator:
@@ -102,14 +103,65 @@ def _pair(kind: str) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-class Line(Section):
-    """A straight line (x and y in m) from ``start`` to ``end`` that the tip follows within ``width``/2 on either side,
-    with the ``elbow`` up (second joint negative) or down."""
+def _powers() -> BeforeValidator:
+    def read(value: Any, info: ValidationInfo) -> tuple[float, ...]:
+        found = tuple(si(x, "position", info, rotary=False) for x in sequence(value, "the value"))
+        if not 1 <= len(found) <= MOST_POWERS:
+            raise ValueError(f"needs 1 to {MOST_POWERS} coefficients, lowest power first, got {len(found)}")
+        return found
+
+    return BeforeValidator(read)
+
+
+class Path(Section):
+    """What the tip follows from end to end, within ``width``/2 (m) on either side, with the ``elbow`` up (second joint
+    negative) or down."""
+
+    width: Annotated[float, positive("position")]
+    elbow: Literal["up", "down"] = "up"
+
+    def point(self, s: Any) -> tuple[Any, Any]:
+        """x and y (m) at path parameters of 0 to 1, elementwise."""
+        raise NotImplementedError
+
+    @property
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where it starts and where it ends, m."""
+        return self.point(0.0), self.point(1.0)
+
+
+class Curve(Path):
+    """A curve of a path parameter s from 0 to 1: ``x`` and ``y`` (m) are polynomials in it, lowest power first."""
+
+    x: Annotated[tuple[float, ...], _powers()]
+    y: Annotated[tuple[float, ...], _powers()]
+
+    @model_validator(mode="after")
+    def _long(self) -> Self:
+        if not any(self.x[1:] + self.y[1:]):
+            raise ValueError('x and y do not depend on s; write for example x = ["0.5 m", "-0.2 m"]')
+        return self
+
+    def point(self, s: Any) -> tuple[Any, Any]:
+        return _horner(self.x, s), _horner(self.y, s)
+
+
+def _horner(powers: tuple[float, ...], s: Any) -> Any:
+    value: Any = 0.0
+    for power in reversed(powers):
+        value = value * s + power
+    return value
+
+
+class Line(Path):
+    """A straight line (x and y in m) from ``start`` to ``end``."""
 
     start: Annotated[tuple[float, float], _pair("position")]
     end: Annotated[tuple[float, float], _pair("position")]
-    width: Annotated[float, positive("position")]
-    elbow: Literal["up", "down"] = "up"
+
+    def point(self, s: Any) -> tuple[Any, Any]:
+        (x0, y0), (x1, y1) = self.start, self.end
+        return x0 + s * (x1 - x0), y0 + s * (y1 - y0)
 
     @model_validator(mode="after")
     def _long(self) -> Self:
@@ -132,19 +184,26 @@ def _release(value: Any, info: ValidationInfo) -> Any:
 
 class Tip(Section):
     """What is asked of the tip: its ``velocity`` (x and y, m/s) at the ``release``, which is at the end, at a time (s)
-    or at a free one, and is then followed by what the axes' ends ask; or a ``line`` to follow."""
+    or at a free one, and is then followed by what the axes' ends ask; or a ``line`` or a ``curve`` to follow."""
 
     velocity: Annotated[tuple[float, float] | None, _pair("velocity")] = None
     release: Annotated[float | Literal["end", "free"], BeforeValidator(_release)] = "end"
     line: Line | None = None
+    curve: Curve | None = None
 
     @model_validator(mode="after")
     def _some(self) -> Self:
-        if (self.velocity is None) == (self.line is None):
-            raise ValueError('give either velocity = ["0 m/s", "12.5 m/s"] or line = { start = …, end = …, width = … }')
-        if self.line is not None and self.release != "end":
-            raise ValueError("release: belongs to a velocity; leave it out beside line")
+        if sum(x is not None for x in (self.velocity, self.line, self.curve)) != 1:
+            raise ValueError('give either velocity = ["0 m/s", "12.5 m/s"] or line = { start = …, end = …, width = … }'
+                             " or curve = { x = …, y = …, width = … }")  # fmt: skip
+        if self.path is not None and self.release != "end":
+            raise ValueError("release: belongs to a velocity; leave it out beside a line or curve")
         return self
+
+    @property
+    def path(self) -> Path | None:
+        """The line or curve, or None."""
+        return self.line or self.curve
 
 
 def dynamics_of(arm: Any) -> Any:

@@ -13,7 +13,7 @@ from trajopt.axes.motion import Motion, driven, loads
 from trajopt.axes.objective import lower
 from trajopt.axes.starts import Guess
 from trajopt.axes.transcription import AxesSetting, AxesTranscript, fractions_of, transcribe
-from trajopt.mesh import Mesh
+from trajopt.mesh import Floats, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.rebuild import rebuild
 from trajopt.trajectory import Trajectory
@@ -64,9 +64,23 @@ def _begin(setting: AxesSetting, model: Any, transcript: AxesTranscript, start: 
         for variables, ends in zip(transcript.torques, loads(setting.problem.dynamics, axes), strict=True):
             for x, values in zip(variables, ends, strict=True):
                 model.start(x, values)
+    if transcript.parameters is not None:
+        model.start(transcript.parameters, _nearest(setting, chains))
     if transcript.parts and start.release is not None:
         for part, seconds in zip(transcript.parts, (start.release, start.duration - start.release), strict=True):
             model.start(part, np.array([seconds]))
+
+
+def _nearest(setting: AxesSetting, chains: list[list[Floats]]) -> Floats:
+    """The path parameters of the points of a curve that are nearest to the tip at the inner nodes, growing."""
+    problem, grid = setting.problem, np.linspace(0.0, 1.0, 2001)
+    assert problem.tip is not None and problem.tip.curve is not None
+    x, y = problem.tip.curve.point(grid)
+    axes = zip(chains, setting.axes, strict=True)
+    q = [chain[0][1:-1] + (axis.problem.move.start_position or 0.0) for chain, axis in axes]
+    tip = problem.dynamics.tip(q)
+    found = grid[np.argmin(np.hypot(tip[0][:, None] - x, tip[1][:, None] - y), axis=1)]
+    return np.asarray(np.maximum.accumulate(found))
 
 
 def _read(setting: AxesSetting, model: Any, transcript: AxesTranscript) -> Motion:

@@ -43,6 +43,11 @@ _HOMES: Final = {"scara": ("scara.two_link", "TwoLinkArm"), "planar": ("scara.pl
 KINDS: Final = tuple(_HOMES)
 
 
+def pictures() -> Any:
+    """The module that draws known arms: ``poses`` and ``tips`` of a solution."""
+    return import_module("scara.figures")
+
+
 def known_arm(kind: str, **numbers: Any) -> Any:
     """The arm of a kind (one of KINDS) with its numbers in SI; imported when it is asked for. Raises BadInput."""
     module, name = _HOMES[kind]

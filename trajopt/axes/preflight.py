@@ -70,10 +70,10 @@ def _tip(problem: AxesProblem) -> None:
         return
     if not problem.reaches:
         raise ValueError("tip: the arm does not know where its tip is; give it methods tip and tip_velocity")
-    if tip.line is not None:
+    if tip.path is not None:
         if not hasattr(problem.dynamics, "inverse"):
-            raise ValueError('tip.line: needs the inverse of two links; use kind = "scara"')
-        _straight(problem)
+            raise ValueError('tip: a line or curve needs the inverse of two links; use kind = "scara"')
+        _within_reach(problem)
         return
     if isinstance(tip.release, float):
         _release(problem, tip.release)
@@ -122,15 +122,16 @@ def _speed(problem: AxesProblem) -> None:
         )
 
 
-def _straight(problem: AxesProblem) -> None:
-    """The line must stay within reach: it leaves the inner circle out, and the ends are refused by the inverse."""
-    assert problem.tip is not None and problem.tip.line is not None
-    line, (nearest, _) = problem.tip.line, problem.dynamics.reach
-    (x, y), (dx, dy) = line.start, (line.end[0] - line.start[0], line.end[1] - line.start[1])
-    share = min(max(-(x * dx + y * dy) / (dx * dx + dy * dy), 0.0), 1.0)
-    distance = ((x + share * dx) ** 2 + (y + share * dy) ** 2) ** 0.5
-    if distance < nearest:
+def _within_reach(problem: AxesProblem) -> None:
+    """The path must stay between the circles that the tip can reach; its ends are refused by the inverse."""
+    assert problem.tip is not None and problem.tip.path is not None
+    nearest, farthest = problem.dynamics.reach
+    s = np.linspace(0.0, 1.0, 1001)
+    distance = np.hypot(*np.broadcast_arrays(*problem.tip.path.point(s)))
+    k = int(np.argmax(np.maximum(nearest - distance, distance - farthest)))
+    if not nearest * (1 - 1e-9) <= distance[k] <= farthest * (1 + 1e-9):
+        name = "line" if problem.tip.line is not None else "curve"
         raise ValueError(
-            f"tip.line: comes within {distance:.6g} m of the first joint, the arm reaches {nearest:.6g} m at least;"
-            " move it away"
+            f"tip.{name}: is {distance[k]:.6g} m from the first joint at {s[k]:.3g} of its way, out of reach:"
+            f" {nearest:.6g} to {farthest:.6g} m; move it inside"
         )

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
 import norms
@@ -213,13 +214,19 @@ class AxesProblem(Section):
             raise BadInput(str(error) if shared else f"axes[{k}].{error}") from None
 
     def _ends(self, k: int) -> tuple[State, State]:
-        """The boundary states of an axis; those of a line follow from its ends."""
+        """The boundary states of an axis; those of a path follow from its ends."""
         move = self.axes[k].move
-        if self.tip is None or self.tip.line is None:
+        if self.tip is None or self.tip.path is None:
             return move.start, move.end
-        line = self.tip.line
-        start, end = ({"position": self.dynamics.inverse(*point, line.elbow)[k]} for point in (line.start, line.end))
+        start, end = ({"position": float(pose[k])} for pose in self.along(np.linspace(0.0, 1.0, 201))[[0, -1]])
         return move.start.model_copy(update=start), move.end.model_copy(update=end)
+
+    def along(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(len(s), joints) angles that put the tip on the path at path parameters, without jumps. Raises BadInput."""
+        assert self.tip is not None and (path := self.tip.path) is not None
+        points = zip(*(np.broadcast_to(x, s.shape) for x in path.point(s)), strict=True)
+        poses = [self.dynamics.inverse(float(x), float(y), path.elbow) for x, y in points]
+        return np.unwrap(np.array(poses), axis=0)
 
     @cached_property
     def felt(self) -> tuple[float, ...]:

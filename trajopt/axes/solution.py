@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from trajopt.answer import Answer
+from trajopt.axes.arm import ArmSection
+from trajopt.axes.dynamics import pictures as known_pictures
 from trajopt.axes.motion import Motion
 from trajopt.axes.problem import AxesProblem
 from trajopt.files import write_atomically
@@ -80,7 +82,11 @@ class AxesSolution(Answer):
         write_atomically(path, ("\n".join([f"# trajopt {self.problem.hash}", header, *rows]) + "\n").encode())
 
     def _pictures(self) -> dict[str, Callable[[], Any]]:
-        return {"motion.png": lambda: self.plot().figure}
+        pictures: dict[str, Callable[[], Any]] = {"motion.png": lambda: self.plot().figure}
+        if isinstance(self.problem.arm, ArmSection):
+            draw = known_pictures()
+            pictures |= {"poses.png": lambda: draw.poses(self).figure, "tip.png": lambda: draw.tips(self).figure}
+        return pictures
 
 
 def _plain(motion: Motion) -> list[dict[str, Any]]:

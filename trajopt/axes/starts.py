@@ -75,7 +75,7 @@ def _derivative(curve: Any, i: int, t: Floats) -> Floats:
 def guesses(problem: AxesProblem) -> Iterator[Guess]:
     """As many starts as the problem asks for, drawn from its seed."""
     rng = np.random.default_rng(problem.search.seed)
-    kind = _along if problem.tip is not None and problem.tip.line is not None else _throw
+    kind = _along if problem.tip is not None and problem.tip.path is not None else _throw
     return islice(iter(lambda: kind(problem, rng), None), problem.search.starts)
 
 
@@ -179,15 +179,12 @@ def _wander(move: Problem, duration: float, rng: np.random.Generator) -> Any:
 
 
 def _along(problem: AxesProblem, rng: np.random.Generator) -> Guess:
-    """Along a line by the inverse kinematics: a smooth step in the path parameter, faster or slower at first."""
-    assert problem.tip is not None and problem.tip.line is not None
+    """Along a path by the inverse kinematics: a smooth step in the path parameter, faster or slower at first."""
     duration, _ = _times(problem, rng)
-    line = problem.tip.line
     t = np.linspace(0.0, 1.0, 41)
     skewed = t ** float(rng.uniform(0.8, 1.25))
     s = skewed**3 * (10 - 15 * skewed + 6 * skewed**2)
-    points = np.outer(1 - s, line.start) + np.outer(s, line.end)
-    poses = np.unwrap([problem.dynamics.inverse(float(x), float(y), line.elbow) for x, y in points], axis=0)
+    poses = problem.along(s)
     speeds = np.gradient(poses, t * duration, axis=0)
     speeds[[0, -1]] = 0.0
     times = t * duration

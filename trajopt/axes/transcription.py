@@ -52,6 +52,7 @@ class AxesTranscript:
     axes: tuple[Transcript, ...]
     torques: tuple[tuple[Any, ...], ...]
     parts: tuple[Any, ...]  # s: durations before and after a free release
+    parameters: Any = None  # (N-1,) of a curve at the inner nodes
 
 
 def transcribe(setting: AxesSetting, model: Any, duration: Any) -> AxesTranscript:
@@ -60,13 +61,14 @@ def transcribe(setting: AxesSetting, model: Any, duration: Any) -> AxesTranscrip
     laid = tuple(lay(axis, model, duration, steps) for axis in setting.axes)
     arm = setting.problem.dynamics
     torques: tuple[tuple[Any, ...], ...] = ()
+    parameters = None
     if arm is not None:
         torques = _torques(arm, model, laid)
         laid = tuple(_loaded(axis, ends) for axis, ends in zip(laid, torques, strict=True))
-        _reach(setting, model, laid)
+        parameters = _reach(setting, model, laid)
     for axis in laid:
         hold(axis)
-    return AxesTranscript(laid, torques, parts)
+    return AxesTranscript(laid, torques, parts, parameters)
 
 
 def _steps(setting: AxesSetting, model: Any, duration: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -104,11 +106,11 @@ def _loaded(axis: Transcript, ends: tuple[Any, ...]) -> Transcript:
     return replace(axis, quantities=Driven(**vars(axis.quantities), torque=torque))
 
 
-def _reach(setting: AxesSetting, model: Any, axes: Sequence[Transcript]) -> None:
-    """Rows for what is asked of the tip."""
+def _reach(setting: AxesSetting, model: Any, axes: Sequence[Transcript]) -> Any:
+    """Rows for what is asked of the tip; the path parameters of a curve, which want a start, or None."""
     tip, arm = setting.problem.tip, setting.problem.dynamics
     if tip is None:
-        return
+        return None
     origins = [axis.problem.move.start_position or 0.0 for axis in axes]
     q = [axis.chain[0] + origin for axis, origin in zip(axes, origins, strict=True)]
     if tip.velocity is not None:
@@ -120,6 +122,20 @@ def _reach(setting: AxesSetting, model: Any, axes: Sequence[Transcript]) -> None
             model.zero(value - wanted, size)
     if tip.line is not None:
         _tube(tip.line, model, arm.tip([x[1:-1] for x in q]))
+    return None if tip.curve is None else _along(tip.curve, model, arm.tip([x[1:-1] for x in q]))
+
+
+def _along(curve: Any, model: Any, tip: tuple[Any, Any]) -> Any:
+    """Path parameters that grow from node to node; the tip in a square about the point of the curve that each stands
+    for, which lies within the width."""
+    count, most = len(tip[0]), curve.width / 8**0.5
+    s = model.vector(count, 1.0, np.zeros(count), np.ones(count), "path")
+    model.nonpositive(s[:-1] - s[1:])
+    for value, wanted in zip(tip, curve.point(s), strict=True):
+        off = value - wanted
+        model.nonpositive(off - most, curve.width)
+        model.nonpositive(-off - most, curve.width)
+    return s
 
 
 def _tube(line: Any, model: Any, tip: tuple[Any, Any]) -> None:

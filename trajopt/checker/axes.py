@@ -2,8 +2,8 @@
 
 The kinematics of every axis go to the two twins. Torque and power of an arm are recomputed by a formulation of the
 checker's own (`trajopt.checker.arm`) and followed between the nodes by the polynomial through their values on every
-interval. Tolerances, relative: as for moves; limits on torque and power, and the width of a line, which are held at the
-nodes, 1e-6 there and 1e-3 (1e-2) between them; tip velocity 1e-6; energy against the work of the joints 1e-6.
+interval. Tolerances, relative: as for moves; limits on torque and power, and the width of a path, which are held at the
+nodes, 1e-6 there and 1e-3 (2e-2) between them; tip velocity 1e-6; energy against the work of the joints 1e-6.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from trajopt.checker.arm import Limbs
 from trajopt.checker.case import DERIVATIVES, VALUE, Array, Case, certificate_checks, time_checks
@@ -39,7 +40,7 @@ from trajopt.checker.result_file import _text as read_text
 
 FORMAT: Final = "trajopt axes 1"
 BETWEEN: Final = 1e-3  # of a limit on torque or power, which is held at the nodes
-_TUBE: Final = 1e-2  # of the width of a line, between the nodes
+_TUBE: Final = 2e-2  # of the width of a path, between the nodes
 _TIP: Final = 1e-6
 _DEGREE: Final = 8  # of the polynomials through torque
 _SMOOTH: Final = 1e-7  # of the peak: what they may miss it by
@@ -186,8 +187,8 @@ def _case(result: Mapping[str, Any], k: int, armed: bool, notes: list[str]) -> C
         raise Malformed("the load of a joint is the arm")
     if armed:
         load = {"inertia": 1.0, "viscous": load.get("viscous", 0.0)}
-    line = isinstance(problem.get("tip"), Mapping) and problem["tip"].get("line") is not None
-    start, end = ({**own.get(key, {}), **({"position": "free"} if line else {})} for key in ("start", "end"))
+    path = isinstance(problem.get("tip"), Mapping) and _path(problem["tip"]) is not None
+    start, end = ({**own.get(key, {}), **({"position": "free"} if path else {})} for key in ("start", "end"))
     time, ended = move.get("time"), _vector(_mapping(trajectory, "trajectory").get("time"), "trajectory.time")
     name = f"{axis.get('name')}."
     metrics = _mapping(result["metrics"], "metrics")
@@ -331,8 +332,8 @@ def _of_the_arm(moved: Moved, notes: list[str]) -> list[Check]:
     tip = moved.problem.get("tip")
     if isinstance(tip, Mapping) and tip.get("velocity") is not None:
         checks += _thrown(moved, tip, q, w)
-    if isinstance(tip, Mapping) and tip.get("line") is not None:
-        checks += _on_the_line(moved, _mapping(tip["line"], "tip.line"), q, w)
+    if isinstance(tip, Mapping) and (path := _path(tip)) is not None:
+        checks += _on_the_path(moved, path, _number((tip.get("line") or tip["curve"]).get("width"), "width"), q, w)
     return checks
 
 
@@ -365,14 +366,28 @@ def _thrown(moved: Moved, tip: Mapping[str, Any], q: Array, w: Array) -> list[Ch
     return [*checks, Check("tip velocity", miss, tolerance, at, miss <= tolerance)]
 
 
-def _on_the_line(moved: Moved, line: Mapping[str, Any], q: Array, w: Array) -> list[Check]:
-    """The ends, and the distance from the line at the nodes and on 16 parts of every interval."""
+def _path(tip: Mapping[str, Any]) -> Array | None:
+    """The complex coefficients of the path that the tip follows, lowest power of the path parameter first."""
+    if tip.get("line") is not None:
+        line = _mapping(tip["line"], "tip.line", ("start", "end", "width", "elbow"))
+        start, end = (complex(*_vector(line.get(key), f"tip.line.{key}")) for key in ("start", "end"))
+        return np.array([start, end - start])
+    if tip.get("curve") is None:
+        return None
+    curve = _mapping(tip["curve"], "tip.curve", ("x", "y", "width", "elbow"))
+    x, y = (_vector(curve.get(key), f"tip.curve.{key}") for key in ("x", "y"))
+    found = np.zeros(max(len(x), len(y), 2), dtype=complex)
+    found[: len(x)] += x
+    found[: len(y)] += 1j * y
+    return found
+
+
+def _on_the_path(moved: Moved, path: Array, width: float, q: Array, w: Array) -> list[Check]:
+    """The ends, and the distance from the path at the nodes and on 16 parts of every interval."""
     assert moved.limbs is not None
-    start, end = (complex(*_vector(line.get(key), f"tip.line.{key}")) for key in ("start", "end"))
-    width, length = _number(line.get("width"), "tip.line.width"), abs(end - start)
-    place = moved.limbs.tip(q, w)[0]
+    place, length = moved.limbs.tip(q, w)[0], float(np.sum(np.abs(path[1:])))
     checks = []
-    for label, found, wanted in (("line start", place[0], start), ("line end", place[-1], end)):
+    for label, found, wanted in (("path start", place[0], path[0]), ("path end", place[-1], np.sum(path))):
         off = float(abs(found - wanted))
         checks.append(Check(label, off, _TIP * length, None, off <= _TIP * length))
     moments = [place]
@@ -380,11 +395,22 @@ def _on_the_line(moved: Moved, line: Mapping[str, Any], q: Array, w: Array) -> l
         for s in np.arange(1, 16) / 16:
             rows = [np.array([_horner(twin.rows(i, moved.twins[0].pieces), s) for twin in moved.twins]) for i in (0, 1)]
             moments.append(moved.limbs.tip(*rows)[0])
-    for label, found, share in (("line", moments[0], _TIP), ("line between nodes", np.concatenate(moments), _TUBE)):
-        across = np.abs(((found - start) * np.conj(end - start)).imag) / length
-        over = max(float(np.max(across)) - width / 2, 0.0)
+    for label, found, share in (("path", moments[0], _TIP), ("path between nodes", np.concatenate(moments), _TUBE)):
+        over = max(float(np.max(_distance(path, found))) - width / 2, 0.0)
         checks.append(Check(label, over, share * width, None, over <= share * width))
     return checks
+
+
+def _distance(path: Array, points: Array) -> Array:
+    """How far points are from a path: from the nearest of 1001 of its points, then by Newton's method."""
+    grid = np.linspace(0.0, 1.0, 1001)
+    first, second = polynomial.polyder(path), polynomial.polyder(path, 2)
+    s = grid[np.argmin(np.abs(points[:, None] - polynomial.polyval(grid, path)), axis=1)]
+    for _ in range(4):
+        off, slope = polynomial.polyval(s, path) - points, polynomial.polyval(s, first)
+        bend = np.abs(slope) ** 2 + (np.conj(off) * polynomial.polyval(s, second)).real
+        s = np.clip(s - (np.conj(off) * slope).real / np.where(bend > 0, bend, np.inf), 0.0, 1.0)
+    return np.asarray(np.abs(polynomial.polyval(s, path) - points))
 
 
 def _of_the_certificate(result: Mapping[str, Any], moved: Moved, notes: list[str]) -> list[Check]:
