@@ -245,7 +245,7 @@ def _replaced(parts: list[str], value: Any) -> tuple[str, ...]:
     section, key = parts
     if section == "objective":
         without = ("norm",) if key == "minimize" and value in p.WITHOUT_NORM else ()
-        return {"terms": ("minimize", "norm", "weight")}.get(key, ("terms", *without))
+        return {"terms": ("minimize", "norm", "weight", "axes", "combine")}.get(key, ("terms", *without))
     twins = _ALIASES.get(section, {})
     return tuple(alias for alias, field in twins.items() if field == key) + ((twins[key],) if key in twins else ())
 
