@@ -182,7 +182,7 @@ def test_fifty_seeds_of_the_sampler_on_a_coarse_mesh() -> None:
 
 @pytest.fixture(scope="module")
 def published() -> trajopt.AxesSolution:
-    problem = changed(trajopt.load("clemen_rupp_scara_euler"), starts=6)
+    problem = changed(trajopt.load("scara_clemen_rupp_euler"), starts=6)
     axes = [
         axis.model_copy(update={"move": axis.move.model_copy(update={"start": start})})
         for axis, start in zip(
@@ -212,7 +212,7 @@ def test_the_published_profile(published: trajopt.AxesSolution) -> None:
             assert np.max(np.abs(found - wanted)) <= 1e-3 * np.max(np.abs(wanted)), (name, key)
 
 
-@pytest.mark.parametrize(("name", "value"), [("clemen_rupp_scara", 401.333), ("clemen_rupp_scara_euler", 408.375)])
+@pytest.mark.parametrize(("name", "value"), [("scara_clemen_rupp", 401.333), ("scara_clemen_rupp_euler", 408.375)])
 def test_with_correct_dynamics_and_payload(name: str, value: float) -> None:
     assert solved(changed(trajopt.load(name), starts=6)).objective == pytest.approx(value, rel=1e-5)
 
