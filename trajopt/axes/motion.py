@@ -38,8 +38,6 @@ class Motion:
     @property
     def objective(self) -> float:
         """The SI value of the problem's objective."""
-        if not self.problem.move.shared:
-            return self.duration
         return measure([axis.transcript for axis in self.axes], self.problem.objective)
 
     @property

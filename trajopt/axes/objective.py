@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from trajopt.axes.problem import AxesObjective, AxesTerm
@@ -13,7 +13,7 @@ from trajopt.transcribe import Transcript
 
 def lower(axes: Sequence[Transcript], objective: AxesObjective) -> Lowered:
     """The objective as a scalar expression; its rows go to the model that the axes share."""
-    model, terms = axes[0].model, list(_measured(axes, objective))
+    model, terms = axes[0].model, [(term, _of_term(axes, term)) for term in objective.terms]
     scale = sum(combined(term, [m.scale for m in found]) for term, found in terms)
     total: Any = 0.0
     for term, found in terms:
@@ -28,8 +28,10 @@ def lower(axes: Sequence[Transcript], objective: AxesObjective) -> Lowered:
 
 
 def measure(axes: Sequence[Transcript], objective: AxesObjective) -> float:
-    """The SI value of an objective on axes whose chains and duration are floats."""
-    return sum(combined(term, [m.value for m in found]) for term, found in _measured(axes, objective))
+    """The SI value of an objective on axes whose chains and durations are floats; the time is that of the slowest."""
+    slowest = max(axes, key=lambda axis: float(axis.duration))
+    found = ((term, [slowest] if term.minimize == "time" else axes) for term in objective.terms)
+    return sum(combined(term, [m.value for m in _of_term(own, term)]) for term, own in found)
 
 
 def combined(term: AxesTerm, values: Sequence[float]) -> float:
@@ -37,11 +39,11 @@ def combined(term: AxesTerm, values: Sequence[float]) -> float:
     return max(values) if term.combine == "max" else sum(values)
 
 
-def _measured(axes: Sequence[Transcript], objective: AxesObjective) -> Iterator[tuple[AxesTerm, list[Measured]]]:
-    """Every term on every axis that it weighs; the time counts once."""
-    for term in objective.terms:
-        one = term.minimize == "time"
-        shares = (term.weight,) if one else term.shares(len(axes))
-        plain = (Term(minimize=term.minimize, norm=term.norm, weight=share) if share else None for share in shares)
-        found = zip(axes[:1] if one else axes, plain, strict=True)
-        yield term, [Measured.of(axis, own) for axis, own in found if own is not None]
+def _of_term(axes: Sequence[Transcript], term: AxesTerm) -> list[Measured]:
+    """A term on every axis that it weighs; the time counts once."""
+    shares = (term.weight,) if term.minimize == "time" else term.shares(len(axes))
+    return [
+        Measured.of(axis, Term(minimize=term.minimize, norm=term.norm, weight=share))
+        for axis, share in zip(axes, shares, strict=False)
+        if share
+    ]

@@ -184,7 +184,8 @@ def _bound(problem: AxesProblem, solutions: list[Solution]) -> dict[str, Any]:
     mixed = not largest and any(term.combine == "max" for term in terms)
     if timed:
         slowest = max(range(len(solutions)), key=lambda k: solutions[k].duration or 0.0)
-        bounds = [bounds[slowest]]
+        least = bounds[slowest]
+        bounds = [None if least is None else sum(term.weight for term in terms) * least]
     if mixed or any(bound is None for bound in bounds):
         return {"lower_bound": None, "gap": None, "bounds": "no bound known: a local optimum"}
     known = [float(bound) for bound in bounds if bound is not None]

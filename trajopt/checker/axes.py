@@ -58,7 +58,7 @@ def _of_the_whole(moved: Moved) -> list[Check]:
     spread = max(ends) - min(ends) if shared else 0.0
     off = max(abs(moved.duration - max(ends)), spread)
     checks = [Check("one duration", off, _TIME * moved.duration, None, off <= _TIME * moved.duration)]
-    found = _objective(moved) if shared else max(ends)
+    found = _objective(moved)
     off, tolerance = abs(found - moved.objective), VALUE * abs(moved.objective)
     note = f"says {moved.objective!r}, recomputed {found!r}" if off else ""
     return [*checks, Check("objective", off, tolerance, None, off <= tolerance, note)]
