@@ -396,7 +396,7 @@ def test_euler_unsolved_and_altered_solutions_are_never_exported(strained: trajo
 
 def test_what_is_no_result_of_a_move_is_refused(tmp_path: Path) -> None:
     trajopt.solve(trajopt.load("two_masses_and_a_spring")).save(tmp_path)
-    with pytest.raises(trajopt.BadInput, match="only the result of a move of an axis"):
+    with pytest.raises(trajopt.BadInput, match="only the result of a move of one axis"):
         trajopt.read_result(tmp_path)
     (tmp_path / "result.json").write_text('{"format": ')
     for path in (tmp_path / "result.json", tmp_path / "missing.json"):

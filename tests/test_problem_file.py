@@ -15,14 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests import bad_mechanisms, bad_plants
+from tests import bad_arms, bad_mechanisms, bad_plants
 from tests.bad_input import CASES, FILES, LINEAR, ROTARY, Bad, BadFile
 from trajopt import preflight, problem_file
 from trajopt.errors import BadInput
 from trajopt.problem import Limit, Problem, Table
 
 JARGON = re.compile(r"Input should|Value error|_error|_type|pydantic|Traceback|recursion|object at 0x|\bnp\.")
-ALL = (*CASES, *bad_plants.CASES, *bad_mechanisms.CASES)
+ALL = (*CASES, *bad_plants.CASES, *bad_mechanisms.CASES, *bad_arms.CASES)
 ALL_FILES = (*FILES, *bad_mechanisms.FILES)
 READY_MADE = sorted(entry.name[:-5] for entry in files("problems").iterdir() if entry.name.endswith(".toml"))
 

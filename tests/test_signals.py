@@ -105,7 +105,7 @@ def test_weights_are_fractions_of_the_duration(degree: int, nodes: bool) -> None
     """Non-negative, one for each sample, and one in all; a constant has its own value as mean."""
     mesh = Mesh(np.array([0.0, 0.1, 0.4, 0.6, 1.0]))
     signal = Signal(np.ones(5) if nodes else None, tuple(np.ones(4) for _ in range(degree + 1)))
-    weights = EXACT.weights(signal, mesh)
+    weights = EXACT.weights(signal, mesh.steps)
     assert weights.shape == signal.samples(FLOATS).shape
     assert np.all(weights > 0)
     assert np.sum(weights) == pytest.approx(1.0, rel=1e-15)
@@ -113,5 +113,5 @@ def test_weights_are_fractions_of_the_duration(degree: int, nodes: bool) -> None
 
 def test_euler_weights_are_plain_sums() -> None:
     mesh = Mesh(np.arange(5) / 4)
-    assert list(EULER.weights(Signal(np.ones(5), ()), mesh)) == [1.0] * 5
-    assert list(EULER.weights(Signal(None, (np.ones(4),)), mesh)) == [1.0] * 4
+    assert list(EULER.weights(Signal(np.ones(5), ()), mesh.steps)) == [1.0] * 5
+    assert list(EULER.weights(Signal(None, (np.ones(4),)), mesh.steps)) == [1.0] * 4

@@ -17,7 +17,7 @@ _HOMES = {
     "from_dict": "trajopt.problem_file",
     "solve": "trajopt.worker",
     "route": "trajopt.routing",
-    "synchronise": "trajopt.axes",
+    "synchronise": "trajopt.axes.synchronise",
     **dict.fromkeys(("pareto", "Front"), "trajopt.fronts"),
     "check": "trajopt.checker",
     "check_file": "trajopt.checker",
@@ -34,10 +34,16 @@ _HOMES = {
     ),  # fmt: skip
     **dict.fromkeys(("PlantProblem", "PlantSection", "Robust"), "trajopt.plant.problem"),
     "PlantSolution": "trajopt.plant.solution",
+    **dict.fromkeys(
+        ("AxesProblem", "Axis", "AxisMove", "Together", "AxesTerm", "AxesObjective", "Search"), "trajopt.axes.problem"
+    ),
+    **dict.fromkeys(("ArmSection", "Tip", "Line", "ParametricCurve"), "trajopt.axes.arm"),
+    "AxesSolution": "trajopt.axes.solution",
     **dict.fromkeys(("TrajoptError", "BadInput", "NoSolution", "MissingSolver", "InternalError"), "trajopt.errors"),
     **dict.fromkeys(("Limit", "Table"), "trajopt.fields"),
     "Curve": "trajopt.curve",
     "Envelope": "trajopt.envelope",
+    **dict.fromkeys(("sin", "cos"), "trajopt.elementwise"),
     **dict.fromkeys(("Norm", "L1", "L2", "Linf"), "norms"),
 }
 

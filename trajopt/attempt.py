@@ -128,7 +128,7 @@ def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, wid
     model = NonconvexModel()
     duration: Any = setting.problem.move.fixed_time
     if duration is None:
-        duration = _free_duration(setting, model, start.duration)
+        duration = free_duration(setting, model, start.duration)
     by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
     transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
     for x, values in zip(transcript.chain, start.chain, strict=True):
@@ -142,7 +142,7 @@ def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, wid
     return _read(setting, transcript, lowered, outcome)
 
 
-def _free_duration(setting: Setting, model: Any, start: float) -> Any:
+def free_duration(setting: Setting, model: Any, start: float) -> Any:
     """A duration that the model chooses, within its range, scaled, and started at ``start`` s."""
     time, size = setting.problem.move.time, setting.sizes.duration
     shortest, longest = time if isinstance(time, tuple) else (0.01 * size, np.inf)

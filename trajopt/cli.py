@@ -74,7 +74,7 @@ def synchronise(
 ) -> None:
     """Move several axes together: the slowest sets the time, the others take the smoothest move within it."""
     from trajopt import problem_file
-    from trajopt.axes import synchronise as together
+    from trajopt.axes.synchronise import synchronise as together
     from trajopt.worker import solve_apart
 
     _refuse_seconds(seconds)

@@ -35,10 +35,10 @@ class Section(BaseModel):
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
 
-def si(value: Any, kind: str, info: ValidationInfo) -> float:
-    """One SI number from a float (code) or a text with a unit (file)."""
+def si(value: Any, kind: str, info: ValidationInfo, rotary: bool | None = None) -> float:
+    """One SI number from a float (code) or a text with a unit (file); of the axis at hand unless ``rotary`` says."""
     context = info.context or {}
-    rotary = bool(context.get("rotary"))
+    rotary = bool(context.get("rotary")) if rotary is None else rotary
     wanted = units.kinds(rotary)[kind]
     if isinstance(value, str):
         return units.to_si(value, kind, rotary)

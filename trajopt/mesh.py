@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,23 +39,31 @@ class Mesh:
         return int(np.argmin(np.abs(self.fractions - fraction)))
 
 
-def mesh_for(problem: Problem) -> Mesh:
-    """Equal intervals, with nodes added where a limit or the load has a corner and at via states.
+def mesh_for(*problems: Problem, also: Sequence[float] = ()) -> Mesh:
+    """Equal intervals, with nodes added where a limit or the load has a corner, at via states and at the times ``also``
+    (s); one mesh for problems of one duration.
 
     An added node that falls within a thousandth of a step of a uniform one takes its place. The Euler scheme keeps
     equal steps.
     """
-    count = problem.transcription.intervals
+    count = problems[0].transcription.intervals
     fractions = np.arange(count + 1) / count
-    duration = problem.move.fixed_time
-    if duration is None or problem.transcription.scheme == "euler":
+    duration = problems[0].move.fixed_time
+    if duration is None or problems[0].transcription.scheme == "euler":
         return Mesh(fractions)
-    corners = [t for limit in problem.limits.given().values() for t in limit.breakpoints]
-    if isinstance(problem.load.inertia, Table):
-        corners += problem.load.inertia.time
-    wanted = np.unique([t / duration for t in (*corners, *(v.time for v in problem.move.via)) if 0 < t < duration])
+    corners = [*also, *(t for problem in problems for t in _corners(problem))]
+    wanted = np.unique([t / duration for t in corners if 0 < t < duration])
     if not len(wanted):
         return Mesh(fractions)
     far = np.min(np.abs(fractions[:, None] - wanted[None, :]), axis=1) > 1e-3 / count
     far[[0, -1]] = True
     return Mesh(np.unique(np.concatenate([fractions[far], wanted])))
+
+
+def _corners(problem: Problem) -> Iterator[float]:
+    """Times (s) at which a limit or the load has a corner, or a via state is passed."""
+    for limit in problem.limits.given().values():
+        yield from limit.breakpoints
+    if isinstance(problem.load.inertia, Table):
+        yield from problem.load.inertia.time
+    yield from (via.time for via in problem.move.via)

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 import pyomo.environ as pyo
+from pyomo.common.modeling import unique_component_name
 
 from trajopt.along import Along, curved
 from trajopt.curve import Curve
@@ -28,6 +29,7 @@ _OPTIONS: Final = {
     "sb": "yes",
 }
 _BEYOND: Final = 0.02  # of its span: how far beyond a table Ipopt may look
+ELEMENTWISE: Final = {"sin": np.frompyfunc(pyo.sin, 1, 1), "cos": np.frompyfunc(pyo.cos, 1, 1)}
 _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: they prove nothing
     0: Claim.OPTIMAL,
     1: Claim.OPTIMAL,  # acceptable, which is set to 1e-8
@@ -71,7 +73,8 @@ class NonconvexModel:
                 self._named.append((f"{name}.{side}", some, size, at[active], own_size(bound[active], size)))
 
     def _add(self, variables: Any, count: int, size: float, name: str = "") -> Any:
-        self._model.add_component(name or f"x{len(self._vectors)}", variables)
+        name = unique_component_name(self._model, name or "x")  # axes have variables of one name
+        self._model.add_component(name, variables)
         x = np.empty(count, dtype=object)
         x[:] = [size * variables[k] for k in range(count)]
         self._vectors.append((x, variables, size))
@@ -111,7 +114,8 @@ class NonconvexModel:
         return np.concatenate(parts)
 
     def total(self, weights: Floats, x: Any) -> Any:
-        return pyo.quicksum(float(w) * y for w, y in zip(weights, x, strict=True))
+        plain = (float(w) if isinstance(w, float) else w for w in weights)  # pyomo is slow on numpy's floats
+        return pyo.quicksum(w * y for w, y in zip(plain, x, strict=True))
 
     def squares(self, x: Any) -> Any:
         return x * x

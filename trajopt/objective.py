@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 
 import norms
-from trajopt.mesh import Floats
 from trajopt.motor import Intake
 from trajopt.problem import WITHOUT_NORM, Ceiling, Load, Objective, Term
 from trajopt.transcribe import Transcript
@@ -46,22 +45,21 @@ def lower(transcript: Transcript, objective: Objective) -> Lowered:
     model = transcript.model
     for ceiling in objective.ceilings or ():
         _hold(transcript, ceiling)
-    measured = [_Measured.of(transcript, term) for term in objective.terms]
+    measured = [Measured.of(transcript, term) for term in objective.terms]
     if len(measured) == 1 and (norm := measured[0].norm) is not None:
         only = measured[0]
         expression = norm.lower_alone(model, only.samples * (1 / only.size), only.weights, only.duration)
         return Lowered(expression * (1 / norm.alone(only.unit)), only.weight * only.size * only.unit, norm)
-    scale = sum(m.weight * m.size * m.unit for m in measured)
+    scale = sum(m.scale for m in measured)
     total: Any = 0.0
     for m in measured:
-        value = m.duration if m.norm is None else m.norm.lower(model, m.samples * (1 / m.size), m.weights, m.duration)
-        total = total + value * (m.weight * (m.size if m.norm is not None else 1.0) / scale)
+        total = total + m.lower(model, scale)
     return Lowered(total, scale, None)
 
 
 def _hold(transcript: Transcript, ceiling: Ceiling) -> None:
     """A term below its ceiling, by the rows of its norm; priced as ``energy.at_most``."""
-    m, most = _Measured.of(transcript, ceiling.term), ceiling.at_most
+    m, most = Measured.of(transcript, ceiling.term), ceiling.at_most
     assert m.norm is not None
     value = m.norm.lower(transcript.model, m.samples * (1 / m.size), m.weights, m.duration) * m.size
     transcript.model.nonpositive(value - most, most, f"{ceiling.term.label}.at_most", np.array([0.5]), np.array([most]))
@@ -69,11 +67,7 @@ def _hold(transcript: Transcript, ceiling: Ceiling) -> None:
 
 def measure(transcript: Transcript, objective: Objective) -> float:
     """The SI value of an objective on a transcript whose chain and duration are floats."""
-    total = 0.0
-    for m in (_Measured.of(transcript, term) for term in objective.terms):
-        value = m.duration if m.norm is None else m.norm.measure(m.samples, m.weights, m.duration)
-        total += m.weight * float(value)
-    return total
+    return sum(Measured.of(transcript, term).value for term in objective.terms)
 
 
 def integral(name: str, load: Load) -> norms.Norm:
@@ -84,35 +78,54 @@ def integral(name: str, load: Load) -> norms.Norm:
 
 
 @dataclass(frozen=True)
-class _Measured:
+class Measured:
     """A term laid on the mesh: its samples, what each stands for, and its sizes."""
 
     samples: Any
-    weights: Floats
+    weights: Any  # floats, or expressions where parts of the duration are free
     duration: Any  # s, or 1 for the plain sums of the Euler scheme
     norm: norms.Norm | None  # None: the term is the duration itself
     weight: float
     size: float  # of the samples, SI
     unit: float  # the norm of samples that are all one
 
+    @property
+    def scale(self) -> float:
+        """What the term is likely to be, SI."""
+        return self.weight * self.size * self.unit
+
+    @property
+    def value(self) -> float:
+        """The term on floats, SI."""
+        if self.norm is None:
+            return self.weight * float(self.duration)
+        return self.weight * float(self.norm.measure(self.samples, self.weights, self.duration))
+
+    def lower(self, model: Any, scale: float) -> Any:
+        """The term over ``scale`` as an expression; its rows go to the model."""
+        if self.norm is None:
+            return self.duration * (self.weight / scale)
+        value = self.norm.lower(model, self.samples * (1 / self.size), self.weights, self.duration)
+        return value * (self.weight * self.size / scale)
+
     @classmethod
-    def of(cls, transcript: Transcript, term: Term) -> _Measured:
+    def of(cls, transcript: Transcript, term: Term) -> Measured:
         duration, sizes = transcript.duration, transcript.sizes
         if term.minimize == "time":
             return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, 1.0)
         energy = term.minimize in WITHOUT_NORM
         quantity = POWERS.get(term.minimize, term.minimize)
         signal = transcript.quantities.signal(quantity)
-        weights = transcript.scheme.weights(signal, transcript.mesh)
+        weights, usual = (transcript.scheme.weights(signal, x) for x in (transcript.shares, transcript.mesh.steps))
         typical = sizes.duration
         if transcript.scheme.terms == 1:  # Euler: plain sums, as in the paper; but an energy stays an integral
             if energy:
-                weights = weights / transcript.mesh.intervals
+                weights = usual = usual / transcript.mesh.intervals
             else:
                 duration = typical = 1.0
         samples = signal.samples(transcript.model)
         if quantity == "position" and transcript.problem.move.start_position is None:
             samples = samples - transcript.chain[0][0]  # positions are absolute then; the norm is of the displacement
         norm = term.norm or integral(term.minimize, transcript.problem.load)
-        unit = norm.measure(np.ones(len(weights)), weights, typical)
+        unit = norm.measure(np.ones(len(usual)), usual, typical)
         return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), unit)

@@ -39,6 +39,7 @@ def draw_load(axes: Axes, load: Load, rotary: bool) -> float:
         drawn += here.plot(at * scale, along.at(at), color=COLOURS[k], linestyle=STYLES[k], linewidth=1.6, label=label)
         here.set_ylabel(f"{label} [{pretty(kinds[name].unit)}]", fontsize=SMALL)
         here.spines["right"].set_visible(k > 0)
+        here.spines["top"].set_visible(False)
         here.tick_params(labelsize=SMALL)
     axes.set_xlabel(f"position [{unit}]", fontsize=SMALL)
     axes.legend(handles=drawn, fontsize=SMALL, frameon=False, loc="best")

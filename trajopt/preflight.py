@@ -13,6 +13,7 @@ from trajopt.problem import DERIVATIVES, ELECTRICAL, LOADED, MOST_INTERVALS, MOT
 from trajopt.rating import refuse_weak_motor
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
 SYMBOLS: Final = ("q", "v", "a", "j", "s")
@@ -33,11 +34,12 @@ def refuse_contradictions(problem: Problem) -> None:
     refuse_weak_motor(problem)
 
 
-def warnings(problem: Problem | PlantProblem) -> list[str]:
+def warnings(problem: Problem | PlantProblem | AxesProblem) -> list[str]:
     """What looks like a slip but may be meant, one line each: a unit off by 1000, a step too coarse for the jerk. The
     plain numbers of a plant give none away."""
     if not isinstance(problem, Problem):
-        return []
+        moves = getattr(problem, "moves", ())
+        return [f"{move.title}: {warning}" for move in moves for warning in warnings(move)]
     return [*_clamped(problem), *_wrong_units(problem), *_degrees(problem), *_coarse(problem), *_heavy(problem)]
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo, model_validator
@@ -87,7 +87,8 @@ class Via(State):
         return self
 
 
-def _move_time(value: Any, info: ValidationInfo) -> Any:
+def read_time(value: Any, info: ValidationInfo) -> Any:
+    """A duration: one time, a pair [min, max] or "free"."""
     if value == FREE:
         return FREE
     if isinstance(value, list | tuple):
@@ -107,7 +108,7 @@ class Move(Section):
     """From where to where, in which time: fixed (s), within a pair [min, max] (s), or free; and for how long the axis
     rests before the next cycle (``dwell``, s), which the RMS of the force takes into account."""
 
-    time: Annotated[float | tuple[float, float] | Literal["free"], BeforeValidator(_move_time)]
+    time: Annotated[float | tuple[float, float] | Literal["free"], BeforeValidator(read_time)]
     start: State = State(position=0.0)
     end: State
     via: tuple[Via, ...] = ()
@@ -355,6 +356,8 @@ class Ceiling(Section):
 class Objective(Section):
     """A weighted sum of terms (Clemen & Rupp eq. 26); weights multiply SI values. ``ceilings`` hold further terms."""
 
+    TERM: ClassVar[type[Term]] = Term
+
     terms: tuple[Term, ...]
     ceilings: tuple[Ceiling, ...] | None = None
 
@@ -366,12 +369,13 @@ class Objective(Section):
     @model_validator(mode="before")
     @classmethod
     def _short_form(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and any(key in data for key in Term.model_fields):
+        known = cls.TERM.model_fields
+        if isinstance(data, Mapping) and any(key in data for key in known):
             if "terms" in data:
                 raise ValueError("give either minimize, norm and weight, or terms, not both")
             return {
-                "terms": ({k: v for k, v in data.items() if k in Term.model_fields},),
-                **{k: v for k, v in data.items() if k not in Term.model_fields},
+                "terms": ({k: v for k, v in data.items() if k in known},),
+                **{k: v for k, v in data.items() if k not in known},
             }
         return data
 

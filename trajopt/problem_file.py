@@ -18,6 +18,7 @@ from trajopt.errors import BadInput
 from trajopt.fields import nearest
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
 LARGEST_FILE: Final = 1_000_000  # bytes
@@ -31,6 +32,7 @@ _TOKEN: Final = re.compile(
 )
 _EXAMPLES: Final = {  # what to write for what is missing
     "move": 'write [move] with time = "1 s" and end = { position = "0.25 m" }',
+    "axes": 'write [[axes]] with name = "x" and move.end = { position = "0.25 m" }',
     "move.time": 'write time = "1 s", or "free"',
     "move.end": 'write end = { position = "0.25 m" }',
     "move.via.time": 'write { time = "0.5 s", position = "0.1 m" }',
@@ -58,7 +60,7 @@ _ALIASES: Final = {
 }
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem:
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Problem | PlantProblem | AxesProblem:
     """The problem in a TOML file, or of a ready-made problem's name, with ``key=value`` overrides applied.
 
     Raises BadInput with one line naming the file, the field and the remedy.
@@ -69,7 +71,7 @@ def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> p.Probl
 
 def parse(
     text: str, overrides: Sequence[str] = (), name: str = "problem", folder: Path | None = None
-) -> p.Problem | PlantProblem:
+) -> p.Problem | PlantProblem | AxesProblem:
     """The problem stated by a TOML text, with the tables it names in ``folder`` (here, by default). Raises BadInput."""
     data = read_toml(text, name)
     for override in overrides:
@@ -87,10 +89,14 @@ def read_toml(text: str, name: str) -> dict[str, Any]:
         raise refused(name, f"not a TOML file: {_remedied(str(error))}") from None
 
 
-def from_dict(data: dict[str, Any], name: str = "problem", folder: Path | None = None) -> p.Problem | PlantProblem:
+def from_dict(
+    data: dict[str, Any], name: str = "problem", folder: Path | None = None
+) -> p.Problem | PlantProblem | AxesProblem:
     """The problem stated by a dictionary laid out as a problem file, with unit texts. Raises BadInput."""
     if "plant" in data:
         return _plant(data, name)
+    if "axes" in data or "arm" in data:
+        return _axes(data, name)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
@@ -111,6 +117,30 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
         return PlantProblem.model_validate(data, context={"texts_only": True})
     except ValidationError as error:
         raise refused(name, explain(error, PlantProblem)) from None
+
+
+def _axes(data: dict[str, Any], name: str) -> AxesProblem:
+    """Several axes: each read as a problem of one is, and on an arm in angles unless it says otherwise."""
+    from trajopt.axes.problem import AxesProblem
+
+    for key in ("limits", "load", "vibration", "rotary"):
+        if key in data:
+            raise refused(name, f"{key}: belongs to each of the axes; write it below [[axes]]")
+    if "tip" in data and "arm" not in data:
+        raise refused(name, 'tip: needs an arm; write [arm] with kind = "scara"')
+    axes = data.get("axes")
+    if isinstance(axes, list):
+        arm = {"rotary": True} if "arm" in data else {}
+        data = data | {"axes": [_axis({**arm, **x}, name) if isinstance(x, dict) else x for x in axes]}
+    try:
+        return AxesProblem.model_validate(data, context={"rotary": False, "texts_only": True})
+    except ValidationError as error:
+        raise refused(name, _as_written(explain(error, AxesProblem), data)) from None
+
+
+def _axis(data: dict[str, Any], name: str) -> dict[str, Any]:
+    data = {section: _renamed(section, value, name) for section, value in data.items()}
+    return {"rotary": _rotary(data), **data}
 
 
 def read_text(path: Path, largest: int = LARGEST_FILE, wanted: str = _WANTED) -> str:
@@ -242,7 +272,7 @@ def _replaced(parts: list[str], value: Any) -> tuple[str, ...]:
     section, key = parts
     if section == "objective":
         without = ("norm",) if key == "minimize" and value in p.WITHOUT_NORM else ()
-        return {"terms": ("minimize", "norm", "weight")}.get(key, ("terms", *without))
+        return {"terms": ("minimize", "norm", "weight", "axes", "combine")}.get(key, ("terms", *without))
     twins = _ALIASES.get(section, {})
     return tuple(alias for alias, field in twins.items() if field == key) + ((twins[key],) if key in twins else ())
 
@@ -306,8 +336,9 @@ def explain(error: ValidationError, root: type[BaseModel] = p.Problem) -> str:
     if kind.startswith("string"):
         return f"{field}: must be a text in quotes, got {got}"
     message = first["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
-    below = re.match(r"[a-z][\w.\[\]]*: ", message)  # it names a field below the one that pydantic knows
-    return f"{field}{'.' if below else ': '}{message}" if field else message
+    below = re.match(r"[a-z\[][\w.\[\]]*: ", message)  # it names a field below the one that pydantic knows
+    joint = "" if message.startswith("[") else "." if below else ": "
+    return f"{field}{joint}{message}" if field else message
 
 
 def _meant(loc: Sequence[int | str], root: type[BaseModel]) -> str:

@@ -15,12 +15,13 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from trajopt import checker, units
+from trajopt.answer import seal
 from trajopt.chebyshev import Family, search, search_box
 from trajopt.errors import InternalError
 from trajopt.files import write_atomically
 from trajopt.laws import Laid, Law, refuse, trapezoid
 from trajopt.problem import Problem
-from trajopt.solution import Solution, seal
+from trajopt.solution import Solution
 from trajopt.table import SYMBOLS
 
 FORMAT: Final = "trajopt profiles 1"

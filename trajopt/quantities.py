@@ -156,7 +156,7 @@ class Quantities:
         load, model = self.problem.load, self.model
         if load.curves:
             return self._along()
-        force = signals.product(model, self._inertia(), self.signal("acceleration"))
+        force = self._inertial()
         velocity = self.signal("velocity")
         if load.viscous:
             viscous = signals.constant(load.viscous, self.mesh.intervals)
@@ -203,6 +203,10 @@ class Quantities:
             return 0.0
         return self.model.along(self.chain[0][-1:] + (move.start_position or 0.0), [(force, 0)])[0][0]
 
+    def _inertial(self) -> Signal:
+        """What it takes to accelerate the load."""
+        return signals.product(self.model, self._inertia(), self.signal("acceleration"))
+
     def _inertia(self) -> Signal:
         inertia = self.problem.load.inertia
         if isinstance(inertia, float) or inertia is None:
@@ -220,6 +224,16 @@ class Quantities:
 
     def _power(self) -> Signal:
         return signals.product(self.model, self._force(), self.signal("velocity"))
+
+
+@dataclass(frozen=True)
+class Driven(Quantities):
+    """The quantities of a joint of an arm, whose ``torque`` follows from the motion of all joints."""
+
+    torque: Signal
+
+    def _inertial(self) -> Signal:
+        return self.torque
 
 
 def is_affine(problem: Problem, name: str) -> bool:

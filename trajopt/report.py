@@ -15,6 +15,7 @@ from trajopt.prices import sentence
 from trajopt.problem import Problem
 
 if TYPE_CHECKING:
+    from trajopt.axes.solution import AxesSolution
     from trajopt.plant.solution import PlantSolution
     from trajopt.solution import Solution
 
@@ -27,14 +28,11 @@ _ENERGIES = {
 }
 
 
-def print_solution(solution: Solution | PlantSolution) -> None:
+def print_solution(solution: Solution | PlantSolution | AxesSolution) -> None:
     """Verdict, objective, duration, peaks and RMS with units, certificate, and who solved it and why."""
     if not isinstance(solution.problem, Problem):
-        from trajopt.plant.report import print_command
-        from trajopt.plant.solution import PlantSolution
-
-        assert isinstance(solution, PlantSolution)
-        return print_command(solution)
+        return _print_another_kind(solution)
+    assert not hasattr(solution, "motion") and not hasattr(solution, "command")
     console = Console(highlight=False, soft_wrap=True, markup=False)
     title = solution.problem.title
     console.print(solution.status.value, style="bold", end="")
@@ -68,6 +66,16 @@ def print_solution(solution: Solution | PlantSolution) -> None:
     audit = solution.audit
     console.print(f"checked independently: {audit.get('checks', 0)} checks passed, tolerance {audit.get('tolerance')}")
     console.print(", ".join(f"{name} {1000 * t:.0f} ms" for name, t in solution.timings.items()))
+
+
+def _print_another_kind(solution: Any) -> None:
+    if hasattr(solution, "command"):
+        from trajopt.plant.report import print_command
+
+        return print_command(solution)
+    from trajopt.axes.report import print_motion
+
+    print_motion(solution)
 
 
 def _structure_text(structure: Mapping[str, Any]) -> list[str]:

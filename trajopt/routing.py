@@ -11,6 +11,7 @@ from trajopt.quantities import FORCES, is_affine
 from trajopt.switching_times import as_chain, forwards
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
 
@@ -34,18 +35,28 @@ class Route:
         return dict(vars(self))
 
 
-def route(problem: Problem | PlantProblem) -> Route:
+def route(problem: Problem | PlantProblem | AxesProblem) -> Route:
     """The route of a problem: switching times for a plant and for the minimum time of a chain, else its curvature
     decides, unless ``transcription.solver`` asks otherwise.
 
     Raises BadInput, with the reason, when the solver asked for cannot take the problem.
     """
     if not isinstance(problem, Problem):
-        return Route("arcs", "newton", "minimum time of a linear plant: its switching times, exactly")
+        return _of_another_kind(problem)
     wanted = problem.transcription.solver
     if wanted == "auto" and as_chain(_lean(problem)) is not None:
         return Route("arcs", "newton", "minimum time of a chain of integrators: its switching times, exactly")
     return route_on_mesh(problem)
+
+
+def _of_another_kind(problem: PlantProblem | AxesProblem) -> Route:
+    if hasattr(problem, "plant"):
+        return Route("arcs", "newton", "minimum time of a linear plant: its switching times, exactly")
+    if problem.coupled:
+        why = "the dynamics of an arm couple" if problem.arm is not None else "their time couples"
+        return Route("pyomo", "ipopt", f"{why} the axes: local optima from {problem.search.starts} starts")
+    found = route(problem.moves[0])
+    return found.because(f"nothing couples the axes but their time: each by itself ({found.reason})")
 
 
 def route_on_mesh(problem: Problem) -> Route:

@@ -125,6 +125,8 @@ def _stroke(problem: Problem, duration: float) -> float:
     if any(reach):
         return max(reach)
     by_limits = [_largest(problem, DERIVATIVES[i]) * duration**i for i in (1, 2, 3, 4)]
+    if (room := problem.limits.position) is not None:
+        by_limits.append(room.highest - room.lowest)
     finite = [x for x in by_limits if math.isfinite(x)]
     return min(finite) if finite else 1.0
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from trajopt.mesh import Floats, Mesh
+from trajopt.mesh import Floats
 from trajopt.signals import SHARES, Arithmetic, Signal
 
 
@@ -51,9 +51,9 @@ class Scheme:
             pieces.append(value)
         return Signal(chain[i], (*pieces, chain[i][1:]))
 
-    def weights(self, signal: Signal, mesh: Mesh) -> Floats:
-        """What fraction of the duration each sample of the signal stands for; plain ones for Euler."""
-        steps = mesh.steps
+    def weights(self, signal: Signal, steps: Any) -> Any:
+        """What fraction of the duration each sample of the signal stands for, from the (N,) ``steps`` as fractions of
+        it (expressions where its parts are free); plain ones for Euler."""
         if signal.points:
             inner = [share * steps for share in SHARES]
             ends = [inner[0], inner[-1]] if signal.nodes is None else [2 * SHARES[0] * trapezoids(steps)]
@@ -92,7 +92,7 @@ class Scheme:
         return effect
 
 
-def trapezoids(steps: Floats) -> Floats:
+def trapezoids(steps: Any) -> Any:
     """(N+1,) the weights of the trapezoidal rule."""
     return np.asarray(np.concatenate([steps, [0.0]]) / 2 + np.concatenate([[0.0], steps]) / 2)
 

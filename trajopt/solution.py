@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from trajopt.errors import NoSolution
-from trajopt.files import write_atomically
+from trajopt.answer import Answer, Frozen
 from trajopt.problem import Problem
-from trajopt.routing import Route
 from trajopt.trajectory import Trajectory
-from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,54 +17,30 @@ if TYPE_CHECKING:
 
     from trajopt.export import Report
 
-FORMAT = "trajopt result 1"
 
-
-class Frozen(dict[str, Any]):
-    """A mapping that is not changed once made."""
-
-    def _refuse(self, *_: Any, **__: Any) -> Any:
-        raise TypeError("a solution is frozen; copy it to a dict first")
-
-    __setitem__ = __delitem__ = update = pop = popitem = clear = setdefault = __ior__ = _refuse
-
-    def __reduce__(self) -> Any:
-        return Frozen, (dict(self),)
-
-
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(Answer):
     """What `trajopt.solve` returns. Without a checked trajectory (``status.solved`` is False) it holds no numbers.
 
-    ``objective`` SI; ``duration`` s; ``metrics`` SI by name; ``certificate``: lower bound, gap and what it bounds;
-    ``audit``: report of the independent check; ``prices``: what each limit costs (see `trajopt.prices`);
-    ``structure``: the arcs of a minimum time (see `trajopt.switching_times`); ``explanation`` of an impossible move
-    (see `trajopt.explain`); ``route``: model, solver, reason; ``timings`` s.
+    See `trajopt.answer.Answer`; ``prices``: what each limit costs (see `trajopt.prices`); ``structure``: the arcs of a
+    minimum time (see `trajopt.switching_times`); ``explanation`` of an impossible move (see `trajopt.explain`).
     """
 
-    status: Verdict
+    FORMAT: ClassVar[str] = "trajopt result 1"
+
     problem: Problem
-    route: Route
-    objective: float | None = None
-    duration: float | None = None
-    metrics: Mapping[str, float] = field(default_factory=dict)
-    certificate: Mapping[str, Any] = field(default_factory=dict)
-    audit: Mapping[str, Any] = field(default_factory=dict)
-    explanation: Mapping[str, Any] = field(default_factory=dict)
     prices: Sequence[Mapping[str, Any]] = ()
     structure: Mapping[str, Any] = field(default_factory=dict)
-    timings: Mapping[str, float] = field(default_factory=dict)
     trajectory: Trajectory | None = None
-    message: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("metrics", "certificate", "audit", "explanation", "structure", "timings"):
-            object.__setattr__(self, name, Frozen(getattr(self, name)))
+        super().__post_init__()
+        object.__setattr__(self, "structure", Frozen(self.structure))
         object.__setattr__(self, "prices", tuple(Frozen(row) for row in self.prices))
 
     def _moved(self) -> Trajectory:
         if self.trajectory is None:
-            raise NoSolution(f"{self.status.value}: {self.message or self.status.advice}")
+            raise self.refusal
         return self.trajectory
 
     @property
@@ -169,84 +140,20 @@ class Solution:
 
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data, numbers null where there is no solution."""
-        problem = self.problem.canonical()
-        return {
-            "format": FORMAT,
-            "trajopt": _version(),
-            "status": self.status.value,
-            "message": self.message,
-            "objective": self.objective,
-            "duration": self.duration,
-            "metrics": dict(self.metrics) or None,
-            "certificate": dict(self.certificate) or None,
-            "audit": dict(self.audit) or None,
-            "explanation": dict(self.explanation) or None,
+        return super().to_dict() | {
             "prices": [dict(price) for price in self.prices],
             "structure": dict(self.structure) or None,
-            "route": self.route.to_dict(),
-            "timings": dict(self.timings),
-            "problem_hash": self.problem.hash,
-            "problem": problem,
             "trajectory": None if self.trajectory is None else self.trajectory.to_dict(),
         }
 
-    def sealed(self, **extra: Any) -> dict[str, Any]:
-        """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
-        return seal(self.to_dict() | extra)
-
-    def save(self, directory: str | Path) -> list[Path]:
-        """Write result.json, trajectory.csv, trajectory.png, prices.png and, where there is something to show, arcs.png
-        and vibration.png into ``directory``; returns the paths.
-
-        Without a solution only result.json is written. Raises OSError.
-        """
-        directory = Path(directory)
-        directory.mkdir(parents=True, exist_ok=True)
+    def _pictures(self) -> dict[str, Callable[[], Any]]:
+        """trajectory.png, prices.png and, where there is something to show, arcs.png and vibration.png."""
         pictures: dict[str, Callable[[], Any]] = {
-            "trajectory.png": lambda: self.plot()[0],
-            "prices.png": self.plot_prices,
-            "vibration.png": self.plot_vibration,
-            "arcs.png": lambda: self.plot_arcs()[0],
+            "trajectory.png": lambda: self.plot()[0].figure,
+            "prices.png": lambda: self.plot_prices().figure,
         }
-        for stale in pictures:  # of another answer
-            (directory / stale).unlink(missing_ok=True)
-        written = self.save_data(directory)
-        if self.trajectory is None:
-            return written
-        if not self.problem.vibration:
-            del pictures["vibration.png"]
-        if self.route.model != "arcs":
-            del pictures["arcs.png"]
-        for name, draw in pictures.items():
-            figure: Any = draw().figure
-            figure.savefig(directory / name, dpi=150)
-            written.append(directory / name)
-        return written
-
-    def save_data(self, directory: Path) -> list[Path]:
-        """Write result.json and, with a solution, trajectory.csv into ``directory``; returns the paths. Raises
-        OSError."""
-        directory.mkdir(parents=True, exist_ok=True)
-        written = [directory / "result.json", directory / "trajectory.csv"]
-        written[1].unlink(missing_ok=True)
-        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
-        if self.trajectory is None:
-            return written[:1]
-        write_atomically(written[1], self.csv().encode())
-        return written
-
-    def __repr__(self) -> str:
-        value = "" if self.objective is None else f", objective={self.objective:.9g}, duration={self.duration:.9g}"
-        return f"<Solution {self.status.value}{value}>"
-
-
-def seal(data: dict[str, Any]) -> dict[str, Any]:
-    """The content of a result file with its seal."""
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return data | {"seal": hashlib.sha256(text.encode()).hexdigest()}
-
-
-def _version() -> str:
-    from trajopt import __version__
-
-    return __version__
+        if self.problem.vibration:
+            pictures["vibration.png"] = lambda: self.plot_vibration().figure
+        if self.route.model == "arcs":
+            pictures["arcs.png"] = lambda: self.plot_arcs()[0].figure
+        return pictures

@@ -19,7 +19,7 @@ from trajopt.problem_file import explain
 from trajopt.routing import Route
 from trajopt.scaling import sizes_of
 from trajopt.schemes import SCHEMES
-from trajopt.solution import FORMAT, Solution
+from trajopt.solution import Solution
 from trajopt.trajectory import Trajectory
 from trajopt.verdict import Verdict
 
@@ -36,9 +36,9 @@ def read_result(path: str | os.PathLike[str]) -> Solution:
     except checker.CheckerInputError as error:
         raise BadInput(f"{error}; give the result.json of a solve") from None
     data = json.loads(source.read_text(encoding="utf-8"))
-    if data.get("format") != FORMAT:
-        raise BadInput(f"{source}: format is {data.get('format')!r}; only the result of a move of an axis, {FORMAT!r}, "
-                       "has a trajectory")  # fmt: skip
+    if data.get("format") != Solution.FORMAT:
+        raise BadInput(f"{source}: format is {data.get('format')!r}; only the result of a move of one axis,"
+                       f" {Solution.FORMAT!r}, has a trajectory")  # fmt: skip
     if not report.passed:
         raise TrajoptError(f"{source}: rejected by the checker, nothing is taken from it: {report.summary()}")
     if data["trajectory"] is None:

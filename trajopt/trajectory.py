@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import factorial
 from typing import Any
@@ -33,6 +34,7 @@ class Trajectory:
     origin: float
     chain: tuple[Floats, ...]
     arithmetic: OnFloats = OnFloats()
+    quantities: Callable[..., Quantities] = Quantities  # as in `trajopt.transcribe.Setting`
 
     def __post_init__(self) -> None:
         for values in self.chain:
@@ -59,7 +61,7 @@ class Trajectory:
         """The trajectory as the builder sees it."""
         model = self.arithmetic
         steps = self.mesh.steps * self.duration
-        quantities = Quantities(self.problem, model, self.scheme, self.mesh, self.sizes, list(self.chain), steps)
+        quantities = self.quantities(self.problem, model, self.scheme, self.mesh, self.sizes, list(self.chain), steps)
         return Transcript(
             self.problem, self.mesh, self.scheme, self.sizes, model, list(self.chain), self.duration, quantities
         )

@@ -84,6 +84,12 @@ class Transcript:
     duration: Any  # s: a float, or an expression when it is free
     quantities: Quantities
     widen: Mapping[str, Any] = field(default_factory=dict)
+    phased: bool = False  # whether the steps are no fixed fractions of the duration
+
+    @property
+    def shares(self) -> Any:
+        """(N,) the fraction of the duration that each interval takes: floats, or expressions where parts are free."""
+        return self.quantities.steps / self.duration if self.phased else self.mesh.steps
 
 
 def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, Any] = _NOTHING) -> Transcript:
@@ -93,21 +99,37 @@ def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, 
     ``velocity.max``, to scalar expressions: the side is moved outwards by so many times its own value (see
     `trajopt.model.own_size`).
     """
+    transcript = lay(setting, model, duration, widen=widen)
+    hold(transcript)
+    return transcript
+
+
+def lay(
+    setting: Setting, model: Any, duration: Any, steps: Any = None, widen: Mapping[str, Any] = _NOTHING
+) -> Transcript:
+    """The first half of `transcribe`: kinematics, boundary and via states, and what bounds a variable; ``steps`` (N,),
+    s, are expressions where parts of the duration are free by themselves."""
     problem, mesh, scheme, sizes = setting.problem, setting.mesh, setting.scheme, setting.sizes
-    steps = model.times(mesh.steps, duration)
+    phased = steps is not None
+    steps = steps if phased else model.times(mesh.steps, duration)
     chain = _variables(problem, mesh, sizes, model, duration, widen)
     for i in range(problem.order):
         model.zero(chain[i][1:] - scheme.advance(model, chain, i, steps), sizes.derivative[i])
     for node, i, value in prescribed(problem, mesh):
         model.zero(chain[i][node] - value, sizes.derivative[i])
     known = setting.quantities(problem, model, scheme, mesh, sizes, chain, steps)
-    transcript = Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen)
+    return Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen, phased)
+
+
+def hold(transcript: Transcript) -> None:
+    """The second half of `transcribe`: rows for the limits on all that is no variable, on a transcript whose quantities
+    are known."""
+    problem = transcript.problem
     special = {"envelope": _envelope, "rms_force": _rms, "brake_energy": _brake}
     for name, limit in problem.limits.given().items():
         special.get(name, _limit)(transcript, name, limit)
     for mode in problem.vibration:
         vibration.rows(transcript, mode)
-    return transcript
 
 
 def prescribed(problem: Problem, mesh: Mesh) -> list[tuple[int, int, float]]:
@@ -229,7 +251,7 @@ def _rms(transcript: Transcript, name: str, limit: Limit) -> None:
     if force.points:
         held = transcript.quantities.holding() * (dwell / duration) ** 0.5
         samples = model.concatenate([force.samples(model), np.array([held], dtype=object)])
-        weights = np.append(transcript.scheme.weights(force, transcript.mesh), 1.0)
+        weights = np.append(transcript.scheme.weights(force, transcript.mesh.steps), 1.0)
     elif force.pieces:
         points, shares = gauss(force.degree + 1)
         samples = model.concatenate([force.within(model, point) for point in points])
@@ -251,7 +273,7 @@ def _brake(transcript: Transcript, name: str, limit: Limit) -> None:
     shares = [steps / len(coefficients) if returned.pieces else trapezoids(steps)] * len(coefficients)
     if returned.points:
         coefficients = [returned.samples(model)]
-        shares = [transcript.scheme.weights(returned, transcript.mesh)]
+        shares = [transcript.scheme.weights(returned, transcript.mesh.steps)]
     energy: Any = 0.0
     for values, weights in zip(coefficients, shares, strict=True):
         bound = model.variable(len(weights))

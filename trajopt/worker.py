@@ -18,6 +18,8 @@ from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
+    from trajopt.axes.solution import AxesSolution
     from trajopt.plant.problem import PlantProblem
     from trajopt.plant.solution import PlantSolution
 
@@ -28,7 +30,11 @@ GRACE = 0.5  # s beyond the limit that a solver gets to stop by itself
 def solve(problem: Problem, seconds: float | None = None) -> Solution: ...
 @overload
 def solve(problem: PlantProblem, seconds: float | None = None) -> PlantSolution: ...
-def solve(problem: Problem | PlantProblem, seconds: float | None = None) -> Solution | PlantSolution:
+@overload
+def solve(problem: AxesProblem, seconds: float | None = None) -> AxesSolution: ...
+def solve(
+    problem: Problem | PlantProblem | AxesProblem, seconds: float | None = None
+) -> Solution | PlantSolution | AxesSolution:
     """Solve, check and certify; ``seconds`` limits the wall time, by solving in a process that can be ended.
 
     Returns a solution in every case; look at ``status``. Raises BadInput for a limit that is no positive time and when
@@ -48,7 +54,11 @@ def solve(problem: Problem | PlantProblem, seconds: float | None = None) -> Solu
 def solve_apart(problem: Problem, seconds: float | None = None) -> Solution: ...
 @overload
 def solve_apart(problem: PlantProblem, seconds: float | None = None) -> PlantSolution: ...
-def solve_apart(problem: Problem | PlantProblem, seconds: float | None = None) -> Solution | PlantSolution:
+@overload
+def solve_apart(problem: AxesProblem, seconds: float | None = None) -> AxesSolution: ...
+def solve_apart(
+    problem: Problem | PlantProblem | AxesProblem, seconds: float | None = None
+) -> Solution | PlantSolution | AxesSolution:
     """`trajopt.solve` in a child process, which is ended at the limit (LIMIT) and on Ctrl-C; its death is CRASHED.
 
     Raises what `trajopt.solve` raises, and KeyboardInterrupt.
@@ -74,19 +84,27 @@ def solve_apart(problem: Problem | PlantProblem, seconds: float | None = None) -
             signal.signal(signal.SIGTERM, before)
     if isinstance(answer, BaseException):
         raise answer
-    found: Solution | PlantSolution = answer
+    found: Solution | PlantSolution | AxesSolution = answer
     return found
 
 
-def solve_here(problem: Problem | PlantProblem, seconds: float | None) -> Solution | PlantSolution:
+def solve_here(
+    problem: Problem | PlantProblem | AxesProblem, seconds: float | None
+) -> Solution | PlantSolution | AxesSolution:
     """`solve` in this process, where the limit is kept between and within solver runs only."""
-    if not isinstance(problem, Problem):
-        from trajopt.plant.solving import solve as solve_plant
+    if isinstance(problem, Problem):
+        from trajopt.solving import solve
 
-        return solve_plant(problem, seconds)
-    from trajopt.solving import solve
+        return solve(problem, seconds)
+    from trajopt.axes.problem import AxesProblem
 
-    return solve(problem, seconds)
+    if isinstance(problem, AxesProblem):
+        from trajopt.axes.solving import solve as solve_axes
+
+        return solve_axes(problem, seconds)
+    from trajopt.plant.solving import solve as solve_plant
+
+    return solve_plant(problem, seconds)
 
 
 def _end_with_us() -> Any:
@@ -100,7 +118,7 @@ def _end_with_us() -> Any:
     return signal.signal(signal.SIGTERM, unwind)
 
 
-def _work(sender: Connection, problem: Problem | PlantProblem, seconds: float | None) -> None:
+def _work(sender: Connection, problem: Problem | PlantProblem | AxesProblem, seconds: float | None) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     answer: Any
@@ -118,9 +136,17 @@ def _trace() -> str:
     return traceback.format_exc()
 
 
-def _ended(problem: Problem | PlantProblem, verdict: Verdict, message: str) -> Solution | PlantSolution:
-    if not isinstance(problem, Problem):
-        from trajopt.plant.solution import PlantSolution
+def _ended(
+    problem: Problem | PlantProblem | AxesProblem, verdict: Verdict, message: str
+) -> Solution | PlantSolution | AxesSolution:
+    if isinstance(problem, Problem):
+        return Solution(verdict, problem, route(problem), message=message)
+    from trajopt.axes.problem import AxesProblem
 
-        return PlantSolution(verdict, problem, route(problem), message=message)
-    return Solution(verdict, problem, route(problem), message=message)
+    if isinstance(problem, AxesProblem):
+        from trajopt.axes.solution import AxesSolution
+
+        return AxesSolution(verdict, problem, route(problem), message=message)
+    from trajopt.plant.solution import PlantSolution
+
+    return PlantSolution(verdict, problem, route(problem), message=message)

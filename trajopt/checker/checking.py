@@ -12,6 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from trajopt.checker.axes import FORMAT as AXES
+from trajopt.checker.axes import axes_checks, motion_table_fault
 from trajopt.checker.case import certificate_checks, time_checks
 from trajopt.checker.command import FORMAT, REST, command_checks, steps_checks
 from trajopt.checker.float_twin import FloatTwin
@@ -37,6 +39,9 @@ def check(result: Mapping[str, Any], problem: Mapping[str, Any] | None = None, *
         return replace(_report([*checks, *command_checks(result, notes)], False, strict, notes), tolerance=REST)
     if isinstance(result, Mapping) and result.get("format") == PROFILES:
         return _report([*checks, *law_checks(result, notes)], False, strict, notes)
+    if isinstance(result, Mapping) and result.get("format") == AXES:
+        decided, rational = axes_checks(result, strict, notes)
+        return _report([*checks, *decided], rational, strict, notes)
     try:
         case = read(result, notes)
     except Malformed as fault:
@@ -71,6 +76,8 @@ def check_file(path: str | os.PathLike[str], problem: Mapping[str, Any] | None =
     if Path(path).name != "result.json" or not os.path.lexists(table):
         return report
     notes: list[str] = []
+    if result.get("format") == AXES:
+        return replace(report, checks=(*report.checks, question("trajectory.csv", motion_table_fault(table, result))))
     try:
         case = read(result, notes)
         fault = table_fault(table, case, notes)

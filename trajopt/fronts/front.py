@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trajopt.answer import seal
 from trajopt.fronts.geometry import Outside
 from trajopt.fronts.objectives import friendly, unit
 from trajopt.fronts.scalarise import Plane
 from trajopt.mesh import Floats
 from trajopt.problem import Problem, Term
-from trajopt.solution import Solution, seal
+from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:

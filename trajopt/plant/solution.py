@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from math import pi
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
-from trajopt.errors import NoSolution
-from trajopt.files import write_atomically
+from trajopt.answer import Answer
 from trajopt.plant.command import Command
 from trajopt.plant.exponentials import Floats
 from trajopt.plant.problem import PlantProblem
 from trajopt.plant.simulate import response
-from trajopt.routing import Route
-from trajopt.solution import Frozen, seal
-from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FORMAT: Final = "trajopt command 1"
 _ROWS: Final = 401  # of a frame, besides the switches
 _SAMPLES: Final = 21  # of the switching function, an arc of the result file
 
 
-@dataclass(frozen=True)
-class PlantSolution:
+@dataclass(frozen=True, repr=False)
+class PlantSolution(Answer):
     """What `trajopt.solve` returns for a plant. Without a checked command (``status.solved`` is False) it holds no
     numbers.
 
@@ -41,25 +34,15 @@ class PlantSolution:
     as for moves. ``command`` has ``switches`` (s) and ``levels``.
     """
 
-    status: Verdict
-    problem: PlantProblem
-    route: Route
-    objective: float | None = None
-    duration: float | None = None
-    metrics: Mapping[str, float] = field(default_factory=dict)
-    certificate: Mapping[str, Any] = field(default_factory=dict)
-    audit: Mapping[str, Any] = field(default_factory=dict)
-    timings: Mapping[str, float] = field(default_factory=dict)
-    command: Command | None = None
-    message: str = ""
+    TABLE: ClassVar[str] = "command.csv"
+    FORMAT: ClassVar[str] = "trajopt command 1"
 
-    def __post_init__(self) -> None:
-        for name in ("metrics", "certificate", "audit", "timings"):
-            object.__setattr__(self, name, Frozen(getattr(self, name)))
+    problem: PlantProblem
+    command: Command | None = None
 
     def _found(self) -> Command:
         if self.command is None:
-            raise NoSolution(f"{self.status.value}: {self.message or self.status.advice}")
+            raise self.refusal
         return self.command
 
     @property
@@ -117,59 +100,14 @@ class PlantSolution:
 
     def to_dict(self) -> dict[str, Any]:
         """The result file's content: plain JSON data with the keys of a move's; numbers null without a solution."""
-        from trajopt import __version__
-
-        return {
-            "format": FORMAT,
-            "trajopt": __version__,
-            "status": self.status.value,
-            "message": self.message,
-            "objective": self.objective,
-            "duration": self.duration,
-            "metrics": dict(self.metrics) or None,
-            "certificate": dict(self.certificate) or None,
-            "audit": dict(self.audit) or None,
-            "explanation": None,
-            "prices": [],
+        return super().to_dict() | {
             "structure": None if self.command is None else _structure(self.command),
-            "route": self.route.to_dict(),
-            "timings": dict(self.timings),
-            "problem_hash": self.problem.hash,
-            "problem": self.problem.canonical(),
-            "trajectory": None,
             "command": None if self.command is None else _plain(self.command),
         }
 
-    def sealed(self, **extra: Any) -> dict[str, Any]:
-        """`to_dict` with ``extra`` entries and a seal, the SHA-256 of all of it, by which the checker sees an edit."""
-        return seal(self.to_dict() | extra)
 
-    def save(self, directory: str | Path) -> list[Path]:
-        """Write result.json, command.csv (17 digits), command.png and vibration.png into ``directory``; returns the
-        paths. Without a solution only result.json is written. Raises OSError."""
-        directory = Path(directory)
-        directory.mkdir(parents=True, exist_ok=True)
-        pictures: dict[str, Callable[[], Any]] = {
-            "command.png": lambda: self.plot()[0],
-            "vibration.png": self.plot_vibration,
-        }
-        for stale in ("command.csv", "trajectory.csv", "trajectory.png", "prices.png", *pictures):  # of another answer
-            (directory / stale).unlink(missing_ok=True)
-        written = [directory / "result.json"]
-        write_atomically(written[0], json.dumps(self.sealed(), indent=1, allow_nan=False).encode())
-        if self.command is None:
-            return written
-        written.append(directory / "command.csv")
-        write_atomically(written[-1], self.csv().encode())
-        for name, draw in pictures.items():
-            figure: Any = draw().figure
-            figure.savefig(directory / name, dpi=150)
-            written.append(directory / name)
-        return written
-
-    def __repr__(self) -> str:
-        value = "" if self.duration is None else f", duration={self.duration:.9g}"
-        return f"<PlantSolution {self.status.value}{value}>"
+    def _pictures(self) -> dict[str, Callable[[], Any]]:
+        return {"command.png": lambda: self.plot()[0].figure, "vibration.png": lambda: self.plot_vibration().figure}
 
 
 def _structure(command: Command) -> dict[str, Any]:

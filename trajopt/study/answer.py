@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from trajopt.verdict import Verdict
 
 if TYPE_CHECKING:
-    from trajopt.plant.solution import PlantSolution
-    from trajopt.solution import Solution
+    from trajopt.answer import Answer
 
 FORMAT: Final = "trajopt study 1"
 
@@ -55,7 +54,7 @@ def unsolved(status: Verdict, message: str) -> dict[str, Any]:
     return {"format": FORMAT, "status": status.value, "message": message}
 
 
-def _plain(solution: Solution | PlantSolution, trajectory: bool) -> dict[str, Any]:
+def _plain(solution: Answer, trajectory: bool) -> dict[str, Any]:
     """What is kept of a solution. Nothing of it depends on how long it took."""
     from trajopt import __version__
 
@@ -74,16 +73,20 @@ def _plain(solution: Solution | PlantSolution, trajectory: bool) -> dict[str, An
     return found | ({"files": {".json": json.dumps(solution.sealed()), ".csv": solution.csv()}} if trajectory else {})
 
 
-def _minimised(solution: Solution | PlantSolution) -> str:
+def _minimised(solution: Answer) -> str:
+    from trajopt.axes.problem import AxesProblem
+    from trajopt.axes.report import objective_name as name_of_axes
     from trajopt.problem import Problem
     from trajopt.report import objective_name
 
+    if isinstance(solution.problem, AxesProblem):
+        return name_of_axes(solution.problem)
     return objective_name(solution.problem) if isinstance(solution.problem, Problem) else "time"
 
 
-def _reason(solution: Solution | PlantSolution) -> str:
+def _reason(solution: Answer) -> str:
     """One line on why there is no answer."""
     if solution.status.solved:
         return ""
-    text = list(getattr(solution, "explanation", {}).get("text") or [])
+    text = list(solution.explanation.get("text") or [])
     return " ".join("; ".join(text or [solution.message or solution.status.advice]).split())

@@ -17,11 +17,12 @@ from trajopt.solution import Solution
 from trajopt.transcribe import Setting
 
 if TYPE_CHECKING:
+    from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
 
 def synchronise(
-    problems: Sequence[Problem | PlantProblem],
+    problems: Sequence[Problem | PlantProblem | AxesProblem],
     seconds: float | None = None,
     solve: Callable[..., Solution] = worker.solve,
 ) -> list[Solution]:
@@ -33,13 +34,13 @@ def synchronise(
     some axis can do none, with that verdict. Where an axis has no solution (look at ``status``), its verdict stands and
     the others are those of their own least times.
     ``seconds`` limits each solve; ``solve`` replaces `trajopt.solve`. Raises ValueError without any problem, and
-    BadInput for one that needs its fixed time or is a plant.
+    BadInput for one that needs its fixed time, is a plant or has several axes itself.
     """
     if not problems:
         raise ValueError("needs at least one problem to synchronise")
     moves = [problem for problem in problems if isinstance(problem, Problem)]
     if len(moves) < len(problems):
-        raise BadInput("plant: only moves of axes can be synchronised; solve a plant by itself")
+        raise BadInput("synchronise: takes moves of one axis each; solve a plant, or several axes, by itself")
     fastest = [solve(_in_time(problem, FREE, _TIME), seconds) for problem in moves]
     if not all(solution.status.solved for solution in fastest):
         return fastest
