@@ -17,6 +17,8 @@ from trajopt.rebuild import rebuild
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, transcribe
 
+ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
+
 
 class Clock:
     """Seconds left of a wall-time limit, and where the time went."""
@@ -63,8 +65,6 @@ class Attempt:
         return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
 
 
-ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
-
 Goal = Callable[[Transcript], Lowered]
 
 
@@ -76,9 +76,10 @@ def convex(
     solver: str = "clarabel",
     widen: Sequence[str] = (),
     widen_size: float = 1.0,
+    enough: float = ENOUGH,
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
-    run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate.
+    run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked certificate.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
@@ -98,9 +99,10 @@ def convex(
         clock.charge("model", since)
         since = perf_counter()
         outcome = model.run(rung, clock.left())
-        clock.charge("solve", since)
+        clock.charge("solve", since + outcome.proof)
+        clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)
-        if attempt.gap <= ENOUGH or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
+        if attempt.gap <= enough or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
             return attempt
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
             best = attempt

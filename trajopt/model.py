@@ -52,6 +52,7 @@ class Outcome:
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
     prices: dict[str, Prices] = field(default_factory=dict)
     pair: tuple[Floats, Floats] | None = None  # the primal and dual vector, for `Model.lagrangian`
+    proof: float = 0.0  # s, of ``seconds``, that our own bound took
 
 
 class Model(Rows, Protocol):
