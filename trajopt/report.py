@@ -134,6 +134,16 @@ def certificate_text(solution: Solution) -> str:
     return f"lower bound {bound:.9g} for {certificate['bounds']}: at most {gap:.2g} % could be gained{starts}"
 
 
+def print_timings(solution: Solution | PlantSolution) -> None:
+    """Where the time of a solve went, the most first, and the rest that no account holds."""
+    spent = dict(solution.timings)
+    total = spent.pop("total", sum(spent.values()))
+    spent["else"] = max(total - sum(spent.values()), 0.0)
+    rows = [*sorted(spent.items(), key=lambda row: -row[1]), ("total", total)]
+    for name, seconds in rows:
+        print(f"{name:16} {1e3 * seconds:10.1f} ms {100 * seconds / max(total, 1e-12):6.1f} %")
+
+
 def _table(solution: Solution) -> Table:
     kinds = units.kinds(solution.problem.rotary)
     table = Table(box=None, pad_edge=False)
