@@ -86,23 +86,24 @@ def convex(
     """
     from trajopt.model_cvxpy import LADDER, RESCUE, ConvexModel
 
+    since = perf_counter()
+    model = ConvexModel()
+    by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+    transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
+    lowered = goal(transcript)
+    model.minimize(lowered.expression)
+    clock.charge("model", since)
     best: Attempt | None = None
     for rung in LADDER if solver == "clarabel" else (solver,):
         if rung == RESCUE and best is not None and best.gap <= 1e-6:
             break
         since = perf_counter()
-        model = ConvexModel()
-        by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
-        transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
-        lowered = goal(transcript)
-        model.minimize(lowered.expression)
-        clock.charge("model", since)
-        since = perf_counter()
         outcome = model.run(rung, clock.left())
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)
-        if attempt.gap <= enough or outcome.claim in (Claim.INFEASIBLE, Claim.UNBOUNDED):
+        again = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
+        if attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or again:
             return attempt
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
             best = attempt

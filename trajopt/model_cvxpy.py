@@ -6,6 +6,7 @@ own canonicalisation would arrive at: that took ten times as long as solving it.
 
 from __future__ import annotations
 
+from functools import cached_property
 from time import perf_counter
 from types import SimpleNamespace
 from typing import Any, Final
@@ -122,8 +123,9 @@ class ConvexModel:
         assert self._answer is not None
         return x.at(self._answer)
 
+    @cached_property
     def program(self) -> certificate.ConeProgram:
-        """What has been asked for so far, as the solver sees it; without the constant of the objective."""
+        """All that has been asked for, as the solver sees it; without the constant of the objective."""
         equal, below, inside = (stacked(rows) for rows in (self._equal, self._below, self._inside))
         rows = stacked([equal, below, inside * -1.0])
         P, q, _ = self._objective.quadratic(self._count)
@@ -134,7 +136,7 @@ class ConvexModel:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
         verified; the bound is recomputed from the duals."""
         started = perf_counter()
-        name, program = solver.partition("-")[0].upper(), self.program()
+        name, program = solver.partition("-")[0].upper(), self.program
         interface, options = SOLVERS[name], dict(_SETTINGS[solver])
         if seconds is not None:
             options["time_limit"] = seconds
@@ -157,7 +159,7 @@ class ConvexModel:
         return Outcome(claim, status, value, iterations, ended - started, bound, prices, (x, z), ended - solved)
 
     def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        program, (x, z) = self.program(), pair
+        program, (x, z) = self.program, pair
         return program.value(x) + float(z @ (program.A @ x - program.b))
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:
