@@ -33,7 +33,7 @@ lint: setup
 	$(python) -m mypy trajopt norms scara problems bench
 
 bench: setup
-	$(python) -m bench.least_time --output build/bench
+	$(python) -m bench.run --output build/bench
 	$(python) -m bench.study --output build/bench
 
 soak: setup

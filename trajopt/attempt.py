@@ -14,9 +14,11 @@ from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Objective, Problem, Term
 from trajopt.rebuild import rebuild
-from trajopt.scaling import resized
+from trajopt.scaling import Sizes, resized
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, transcribe
+
+ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
 
 
 class Clock:
@@ -64,8 +66,6 @@ class Attempt:
         return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
 
 
-ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
-
 Goal = Callable[[Transcript], Lowered]
 
 
@@ -77,10 +77,11 @@ def convex(
     solver: str = "clarabel",
     widen: Sequence[str] = (),
     widen_size: float = 1.0,
+    enough: float = ENOUGH,
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
-    run is optimal within ENOUGH by our own bound, or infeasible by a checked certificate; each rung has the sizes of
-    the best move so far.
+    run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked certificate; each rung
+    has the sizes of the best move so far.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
@@ -88,22 +89,25 @@ def convex(
     from trajopt.model_cvxpy import LADDER, RESCUES, ConvexModel
 
     best: Attempt | None = None
+    stated: Sizes | None = None  # for which the model has been built
     for rung in LADDER if solver == "clarabel" else (solver,):
         if rung in RESCUES and best is not None and best.gap <= 1e-6:
             break
-        since = perf_counter()
-        model = ConvexModel()
-        by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
-        transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
-        lowered = goal(transcript)
-        model.minimize(lowered.expression)
-        clock.charge("model", since)
+        if stated is not setting.sizes:
+            since, stated = perf_counter(), setting.sizes
+            model = ConvexModel()
+            by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+            transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
+            lowered = goal(transcript)
+            model.minimize(lowered.expression)
+            clock.charge("model", since)
         since = perf_counter()
         outcome = model.run(rung, clock.left())
-        clock.charge("solve", since)
+        clock.charge("solve", since + outcome.proof)
+        clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)
-        again = best is not None and outcome.claim is best.outcome.claim  # one rung alone may be wrong about it
-        if attempt.gap <= ENOUGH or outcome.claim is Claim.INFEASIBLE or (outcome.claim is Claim.UNBOUNDED and again):
+        again = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
+        if attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or again:
             return attempt
         bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):

@@ -100,13 +100,16 @@ def _into_dual_cone(program: ConeProgram, z: Floats) -> Floats:
     z = z.copy()
     at = program.zero + program.nonnegative
     np.maximum(z[program.zero : at], 0.0, out=z[program.zero : at])
-    for size in program.cones:
-        head, tail = z[at], z[at + 1 : at + size]
-        length = float(np.linalg.norm(tail))
-        if length > head:
-            z[at] = max((head + length) / 2, 0.0)
-            tail *= z[at] / length
-        at += size
+    if program.cones:
+        sizes = np.array(program.cones)
+        heads = np.cumsum(sizes) - sizes
+        tails = z[at:].copy()
+        head, tails[heads] = tails[heads], 0.0
+        length = np.sqrt(np.add.reduceat(np.square(tails), heads))
+        outside = length > head
+        moved = np.where(outside, np.maximum((head + length) / 2, 0.0), head)
+        z[at:] = tails * np.repeat(np.where(outside, moved / np.where(outside, length, 1.0), 1.0), sizes)
+        z[at + heads] = moved
     return z
 
 

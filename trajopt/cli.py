@@ -40,6 +40,7 @@ def solve(
     ] = None,
     seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit, s")] = None,
     tighten: Annotated[bool, typer.Option("--tighten", help="tighten the bound on power and energy")] = False,
+    timings: Annotated[bool, typer.Option("--timings", help="say where the time went")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem; exits 0 only with a checked answer."""
@@ -57,9 +58,11 @@ def solve(
         compared = solution.comparison() if solution.status.solved else []
         print(json.dumps(solution.sealed(comparison=compared), allow_nan=False))
     else:
-        from trajopt.report import print_solution
+        from trajopt.report import print_solution, print_timings
 
         print_solution(solution)
+        if timings:
+            print_timings(solution)
         for path in written:
             print(f"wrote {path}")
     raise typer.Exit(solution.status.exit_code)

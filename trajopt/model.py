@@ -1,6 +1,6 @@
 """What a model must offer so that one constraint builder serves all: residuals, never comparisons.
 
-A model is short-lived: built by `trajopt.transcribe`, solved once, and gone. Expressions are opaque to the builder;
+A model is short-lived: built by `trajopt.transcribe`, solved, and gone. Expressions are opaque to the builder;
 they support ``+``, ``-``, slices, and products with a scalar. All other operations go through the model.
 """
 
@@ -52,6 +52,7 @@ class Outcome:
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
     prices: dict[str, Prices] = field(default_factory=dict)
     pair: tuple[Floats, Floats] | None = None  # the primal and dual vector, for `Model.lagrangian`
+    proof: float = 0.0  # s, of ``seconds``, that our own bound took
 
 
 class Model(Rows, Protocol):
@@ -86,7 +87,8 @@ class Model(Rows, Protocol):
         """The Lagrangian of this program at another's primal and dual vector; its slope in a parameter is a price."""
 
     def run(self, solver: str, seconds: float | None = None) -> Outcome:
-        """Hand the program to a solver. Never raises for a failed solve; raises MissingSolver."""
+        """Hand the program, now complete, to a solver, or to a further one where the first failed. Never raises for a
+        failed solve; raises MissingSolver."""
 
 
 def own_size(bound: Floats, size: float) -> Floats:

@@ -1,16 +1,23 @@
-"""Convex models: CVXPY with Clarabel or OSQP. The only file that imports cvxpy."""
+"""Convex models: Clarabel or OSQP through CVXPY's interfaces to them. The only file that imports cvxpy.
+
+The program is collected as rows of one sparse matrix (`trajopt.affine`) and goes to CVXPY as the cone program that its
+own canonicalisation would arrive at: that took ten times as long as solving it.
+"""
 
 from __future__ import annotations
 
-import warnings
+from functools import cached_property
 from time import perf_counter
+from types import SimpleNamespace
 from typing import Any, Final
 
 import cvxpy
 import numpy as np
+from cvxpy.reductions.solvers.defines import SOLVER_MAP_CONIC, SOLVER_MAP_QP
 from scipy import sparse
 
 from trajopt import certificate
+from trajopt.affine import Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
 from trajopt.model import Claim, Floats, Outcome, Prices, own_size
 
@@ -27,6 +34,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
 }
 RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, and not for cones: where none came near
 LADDER: Final = ("clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
+SOLVERS: Final[dict[str, Any]] = {"CLARABEL": SOLVER_MAP_CONIC["CLARABEL"], "OSQP": SOLVER_MAP_QP["OSQP"]}
 
 
 class ConvexModel:
@@ -35,12 +43,18 @@ class ConvexModel:
     convex = True
 
     def __init__(self) -> None:
-        self._rows: list[Any] = []
-        self._names: dict[str, list[Any]] = {}
-        self._objective: Any = 0.0
+        self._count = 0
+        self._equal: list[Affine] = []
+        self._below: list[Affine] = []
+        self._inside: list[Affine] = []  # of second-order cones, of these sizes
+        self._sizes: list[int] = []
+        self._last = 0
+        self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
+        self._objective = Affine.of(0.0)
+        self._answer: Floats | None = None
 
     def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
-        x = cp.Variable(count)
+        x = self.variable(count) * size
         for bound, sign, side in ((lower, -1.0, "min"), (upper, 1.0, "max")):
             active = np.flatnonzero(np.isfinite(bound))
             if len(active):
@@ -48,107 +62,118 @@ class ConvexModel:
                 limit = bound[active]
                 key, where = (f"{name}.{side}", at[active]) if at is not None else ("", None)
                 row_size = max(size, float(np.max(np.abs(limit))))
-                self.nonpositive(size * sign * some - sign * limit, row_size, key, where, own_size(limit, size))
-        return size * x
+                self.nonpositive(sign * some - sign * limit, row_size, key, where, own_size(limit, size))
+        return x
 
-    def variable(self, count: int) -> Any:
-        return cp.Variable(count)
+    def variable(self, count: int) -> Affine:
+        self._count += count
+        return Affine.variables(self._count - count, count)
 
     def zero(self, residual: Any, size: float = 1.0) -> None:
-        self._rows.append(residual / size == 0)
+        self._equal.append(Affine.of(residual) / size)
 
-    def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> Any:
-        row = residual / size <= 0
-        self._rows.append(row)
+    def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> None:
+        rows = Affine.of(residual) / size
+        if rows.squares:  # bounded by variables: measured, with the cones on their own the duals are more exact
+            bound = self.variable(len(rows))
+            self._add_cones(*in_cones(rows.convex - bound))
+            rows = rows.affine + bound
         if name:
-            self._names.setdefault(name, []).append((row, size, at, own))
-        return row
+            self._names.setdefault(name, []).append((slice(self._last, self._last + len(rows)), size, at, own))
+        self._last += len(rows)
+        self._below.append(rows)
 
     def times(self, factor: Any, x: Any) -> Any:
-        if isinstance(x, float | np.ndarray):
-            return factor * x
-        return factor * x if np.ndim(factor) == 0 else cp.multiply(factor, x)
+        return factor * x
 
-    def concatenate(self, parts: list[Any]) -> Any:
-        return cp.hstack(parts)
+    def concatenate(self, parts: list[Any]) -> Affine:
+        return stacked([Affine.of(part) for part in parts])
 
     def total(self, weights: Floats, x: Any) -> Any:
-        return weights @ x
+        return Affine.of(x).total(weights)
 
-    def squares(self, x: Any) -> Any:
-        return cp.square(x)
+    def squares(self, x: Any) -> Affine:
+        return Affine.of(x).squared()
 
-    def magnitude(self, x: Any) -> Any:
-        return cp.abs(x)
+    def magnitude(self, x: Any) -> Affine:
+        bound = self.variable(len(x))
+        self.nonpositive(x - bound)
+        self.nonpositive(-x - bound)
+        return bound
 
     def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
-        self._rows.append(cp.SOC(bound, cp.multiply(weights, x)))
+        self._add_cones(stacked([Affine.of(bound), Affine.of(x) * weights]), [len(weights) + 1])
+
+    def _add_cones(self, inside: Affine, sizes: list[int]) -> None:
+        self._inside.append(inside)
+        self._sizes += sizes
 
     def minimize(self, value: Any) -> None:
-        self._objective = value
+        value = Affine.of(value)
+        self._objective = value.affine
+        for _, weights, of in value.squares:
+            if len(of.rows) > len(of):  # a sum of several gets a variable of its own: OSQP stalls without
+                own = self.variable(len(of))
+                self.zero(of - own)
+                of = own
+            self._objective = self._objective + of.squared().total(weights)
 
     def value(self, x: Any) -> Floats:
-        return np.asarray(x.value if hasattr(x, "value") else x, dtype=float)
+        if not isinstance(x, Affine):
+            return np.asarray(x, dtype=float)
+        assert self._answer is not None
+        return x.at(self._answer)
+
+    @cached_property
+    def program(self) -> certificate.ConeProgram:
+        """All that has been asked for, as the solver sees it; without the constant of the objective."""
+        equal, below, inside = (stacked(rows) for rows in (self._equal, self._below, self._inside))
+        rows = stacked([equal, below, inside * -1.0])
+        P, q, _ = self._objective.quadratic(self._count)
+        A = sparse.csc_array(rows.matrix(self._count))
+        return certificate.ConeProgram(P, q, A, -rows.constant, len(equal), len(below), tuple(self._sizes))
 
     def run(self, solver: str, seconds: float | None = None) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
         verified; the bound is recomputed from the duals."""
         started = perf_counter()
-        name = solver.partition("-")[0]
-        problem = cp.Problem(cp.Minimize(self._objective), self._rows)
-        options = dict(_SETTINGS[solver])
+        name, program = solver.partition("-")[0].upper(), self.program
+        interface, options = SOLVERS[name], dict(_SETTINGS[solver])
         if seconds is not None:
             options["time_limit"] = seconds
-        try:
-            data, chain, inverse = problem.get_problem_data(name.upper(), solver_opts=options)
-        except cp.SolverError as error:
-            if name.upper() not in cp.installed_solvers():
-                raise MissingSolver(
-                    f"{name} is not installed; 'pip install {name}' or 'make demo' brings it"
-                ) from error
-            return Outcome(Claim.FAILED, f"{name} does not take cone programs")
-        raw = chain.solve_via_data(problem, data, solver_opts=options)
-        try:
-            with warnings.catch_warnings():  # "may be inaccurate": the check decides that
-                warnings.simplefilter("ignore")
-                problem.unpack_results(raw, chain, inverse)
-        except cp.SolverError:
-            return Outcome(Claim.FAILED, str(raw.status), seconds=perf_counter() - started)
-        claim = _CLAIMS.get(problem.status, Claim.FAILED)
-        program, z = _program(data), np.asarray(raw.z if name == "clarabel" else raw.y, dtype=float)
-        value, bound = np.nan, -np.inf
+        if not interface.is_installed():
+            raise MissingSolver(f"{solver} is not installed; 'pip install {solver}' or 'make demo' brings it")
+        if name == "OSQP" and program.cones:
+            return Outcome(Claim.FAILED, "osqp does not take cone programs")
+        raw = interface.solve_via_data(_data(name, program), False, False, options)
+        status, iterations, x, z = _read(interface, raw)
+        solved = perf_counter()
+        claim, value, bound = _CLAIMS.get(status, Claim.FAILED), np.nan, -np.inf
         if claim is Claim.INFEASIBLE and not certificate.is_infeasible(program, z):
             claim = Claim.FAILED
         if claim in (Claim.OPTIMAL, Claim.INACCURATE):
-            x = np.asarray(raw.x)
-            value = float(problem.value)
-            bound = value - (program.value(x) - certificate.lower_bound(program, x, z))
-        stats = problem.solver_stats
-        seconds = perf_counter() - started
-        pair = (np.asarray(raw.x), z)
-        return Outcome(claim, problem.status, value, stats.num_iters or 0, seconds, bound, self._prices(), pair)
+            self._answer, constant = x, self._objective.quadratic(self._count)[2]
+            value = program.value(x) + constant
+            bound = certificate.lower_bound(program, x, z) + constant
+        ended = perf_counter()
+        prices = self._prices(z[program.zero :])
+        return Outcome(claim, status, value, iterations, ended - started, bound, prices, (x, z), ended - solved)
 
     def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        problem = cp.Problem(cp.Minimize(self._objective), self._rows)
-        program = _program(problem.get_problem_data(cp.CLARABEL)[0])
-        x, z = pair
+        program, (x, z) = self.program, pair
         return program.value(x) + float(z @ (program.A @ x - program.b))
 
-    def _prices(self) -> dict[str, Prices]:
-        """The prices of named rows; empty where the solver gave no duals."""
+    def _prices(self, multipliers: Floats) -> dict[str, Prices]:
+        """The prices of named rows, from the multipliers of inequalities."""
         with np.errstate(over="ignore"):  # of a limit absurdly small against the move
-            return self._read_prices()
-
-    def _read_prices(self) -> dict[str, Prices]:
-        return {
-            name: Prices(
-                np.concatenate([at for _, _, at, _ in rows]),
-                np.concatenate([np.atleast_1d(row.dual_value) / size for row, size, _, _ in rows]),
-                np.concatenate([own for _, _, _, own in rows]),
-            )
-            for name, rows in self._names.items()
-            if all(row.dual_value is not None for row, _, _, _ in rows)
-        }
+            return {
+                name: Prices(
+                    np.concatenate([at for _, _, at, _ in rows]),
+                    np.concatenate([multipliers[place] / size for place, size, _, _ in rows]),
+                    np.concatenate([own for _, _, _, own in rows]),
+                )
+                for name, rows in self._names.items()
+            }
 
 
 _CLAIMS: Final = {
@@ -161,13 +186,22 @@ _CLAIMS: Final = {
 }
 
 
-def _program(data: dict[str, Any]) -> certificate.ConeProgram:
-    """What the solver was given, in one form for both."""
-    dims = data["dims"]
-    P = data.get("P")
-    if "F" in data:  # OSQP: equalities, then inequalities F x <= G
-        A, b, q = sparse.vstack([data["A"], data["F"]]), np.concatenate([data["b"], data["G"]]), data["q"]
+def _data(name: str, program: certificate.ConeProgram) -> dict[str, Any]:
+    """The program under the names that CVXPY's interfaces read."""
+    P, A, b, zero = program.P, program.A, program.b, program.zero
+    if name == "OSQP":
+        rows = sparse.csr_array(A)
+        return {"P": P, "q": program.q, "A": rows[:zero], "b": b[:zero], "F": rows[zero:], "G": b[zero:]}
+    dims = SimpleNamespace(
+        zero=zero, nonneg=program.nonnegative, soc=list(program.cones), exp=0, psd=[], p3d=[], pnd=[]
+    )
+    return {"P": P, "c": program.q, "A": A, "b": b, "dims": dims}
+
+
+def _read(interface: Any, raw: Any) -> tuple[str, int, Floats, Floats]:
+    """CVXPY's word for how a run ended, its iterations, and the primal and dual vectors."""
+    if interface.name() == "OSQP":
+        status, iterations, z = interface.STATUS_MAP.get(raw.info.status_val), raw.info.iter, raw.y
     else:
-        A, b, q = data["A"], data["b"], data["c"]
-    P = sparse.csc_array((len(q), len(q))) if P is None else sparse.csc_array(P)
-    return certificate.ConeProgram(P, q, sparse.csc_array(A), b, dims.zero, dims.nonneg, tuple(dims.soc))
+        status, iterations, z = interface.STATUS_MAP.get(str(raw.status)), raw.iterations, raw.z
+    return status or cp.SOLVER_ERROR, iterations, np.asarray(raw.x, dtype=float), np.asarray(z, dtype=float)

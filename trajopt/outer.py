@@ -34,11 +34,11 @@ def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
     from trajopt.model_cvxpy import LADDER, ConvexModel
 
     setting = replace(setting, problem=implied(setting.problem))
+    model = ConvexModel()
+    by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf))[0]
+    _rows(setting, duration, model, by)
+    model.minimize(by)
     for rung in LADDER:
-        model = ConvexModel()
-        by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf))[0]
-        _rows(setting, duration, model, by)
-        model.minimize(by)
         outcome = model.run(rung, clock.left())
         if outcome.claim is Claim.INFEASIBLE or outcome.bound > _CERTAIN:
             return True

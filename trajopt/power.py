@@ -31,14 +31,15 @@ from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, prescribed, without
 
 _STEPS: Final = 30
-_ENOUGH: Final = 1e-10  # relative: a smaller gain ends the descent
+_ENOUGH: Final = 1e-10  # relative: a smaller gain ends the descent; so does a program whose value was as it foretold
+_TIGHT: Final = 5e-9  # relative gap of the relaxation: it lies further below every move than that
 
 
 def relax(setting: Setting, clock: Clock) -> Attempt:
     """The relaxation: its ``bound`` holds for every move on the mesh; its trajectory meets all but the power."""
     duration, setting = setting.problem.move.fixed_time, without(setting, ["brake_energy"])
     assert duration is not None
-    return convex(replace(setting, quantities=Lifted), duration, to(setting.problem.objective), clock)
+    return convex(replace(setting, quantities=Lifted), duration, to(setting.problem.objective), clock, enough=_TIGHT)
 
 
 def descend(setting: Setting, start: Trajectory, clock: Clock) -> Attempt:
@@ -54,7 +55,7 @@ def descend(setting: Setting, start: Trajectory, clock: Clock) -> Attempt:
         penalty = max(penalty, _penalty(attempt))
         value = _cost(objective, here, penalty)
         there, best = _search_line(setting, here, attempt.trajectory, value, penalty)
-        settled = value - best <= _ENOUGH * abs(best)
+        settled = min(value - best, abs(best - attempt.value)) <= _ENOUGH * abs(best)
         if best <= value:
             here = there
         if settled:

@@ -15,6 +15,7 @@ from trajopt.prices import sentence
 from trajopt.problem import Problem
 
 if TYPE_CHECKING:
+    from trajopt.answer import Answer
     from trajopt.axes.solution import AxesSolution
     from trajopt.plant.solution import PlantSolution
     from trajopt.solution import Solution
@@ -148,6 +149,16 @@ def certificate_text(solution: Solution) -> str:
         return f"{certificate['bounds']}{starts}"
     bound, gap = certificate["lower_bound"], 100 * certificate["gap"]
     return f"lower bound {bound:.9g} for {certificate['bounds']}: at most {gap:.2g} % could be gained{starts}"
+
+
+def print_timings(solution: Answer) -> None:
+    """Where the time of a solve went, the most first, and the rest that no account holds."""
+    spent = dict(solution.timings)
+    total = spent.pop("total", sum(spent.values()))
+    spent["else"] = max(total - sum(spent.values()), 0.0)
+    rows = [*sorted(spent.items(), key=lambda row: -row[1]), ("total", total)]
+    for name, seconds in rows:
+        print(f"{name:16} {1e3 * seconds:10.1f} ms {100 * seconds / max(total, 1e-12):6.1f} %")
 
 
 def _table(solution: Solution) -> Table:

@@ -161,21 +161,32 @@ def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Cloc
 def _shortest(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
     """The least time, and the smoothest move in it if the edge of feasibility leaves room to find it."""
     attempt = minimum_time(lean, clock)
-    candidates = [(attempt, chosen)]
-    if attempt.trajectory is not None:
-        duration = attempt.trajectory.duration
-        move = lean.problem.move.model_copy(update={"time": duration})
-        at_time = replace(lean, problem=lean.problem.model_copy(update={"move": move}))
-        smooth = convex(at_time, duration, to(smoothest(lean.problem)), clock)
-        if smooth.trajectory is not None:
-            tied = replace(attempt, trajectory=replace(smooth.trajectory, problem=lean.problem))
-            candidates.insert(0, (tied, tied_route(chosen, lean, attempt, tied, "time")))
-        later = duration * (1 + _LATER)  # off the edge, where there is room to keep the limits to the last digit
-        inner = convex(drawn_in(at_time, _DRAWN), later, to(smoothest(lean.problem)), clock)
-        if inner.trajectory is not None:
-            late = replace(attempt, trajectory=replace(inner.trajectory, problem=lean.problem), value=later)
-            candidates.insert(1, (late, candidates[0][1]))
-    return first_solved(setting, candidates, clock), attempt
+    return first_solved(setting, _shortest_candidates(lean, attempt, chosen, clock), clock), attempt
+
+
+def _shortest_candidates(
+    lean: Setting, attempt: Attempt, chosen: Route, clock: Clock
+) -> Iterator[tuple[Attempt, Route]]:
+    """The smoothest move in the least time; one a little off the edge, where there is room to keep the limits to the
+    last digit; and the move that the search ended with."""
+    if attempt.trajectory is None:
+        yield attempt, chosen
+        return
+    duration = attempt.trajectory.duration
+    move = lean.problem.move.model_copy(update={"time": duration})
+    at_time = replace(lean, problem=lean.problem.model_copy(update={"move": move}))
+    smooth = convex(at_time, duration, to(smoothest(lean.problem)), clock)
+    first = attempt, chosen
+    if smooth.trajectory is not None:
+        tied = replace(attempt, trajectory=replace(smooth.trajectory, problem=lean.problem))
+        first = tied, tied_route(chosen, lean, attempt, tied, "time")
+    yield first
+    later = duration * (1 + _LATER)
+    inner = convex(drawn_in(at_time, _DRAWN), later, to(smoothest(lean.problem)), clock)
+    if inner.trajectory is not None:
+        yield replace(attempt, trajectory=replace(inner.trajectory, problem=lean.problem), value=later), first[1]
+    if smooth.trajectory is not None:
+        yield attempt, chosen
 
 
 def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:

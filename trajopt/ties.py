@@ -14,6 +14,7 @@ from trajopt.routing import Route
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript
 
+_ENOUGH: Final = 1e-8  # gap of the second solve, whose value nobody is told
 HELD: Final = (1e-9, 1e-8)  # relative: how closely the second solve holds the optimum; the first that it can
 
 
@@ -43,7 +44,7 @@ def _smoothest_optimum(setting: Setting, attempt: Attempt, share: float, clock: 
         transcript.model.nonpositive(held.expression - best - share * max(abs(best), 1e-3))
         return lower(transcript, smooth)
 
-    return convex(setting, attempt.trajectory.duration, goal, clock)
+    return convex(setting, attempt.trajectory.duration, goal, clock, enough=_ENOUGH)
 
 
 def _costs_no_more(setting: Setting, trajectory: Trajectory, attempt: Attempt, share: float) -> bool:

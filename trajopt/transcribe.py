@@ -281,7 +281,7 @@ def _brake(transcript: Transcript, name: str, limit: Limit) -> None:
         model.nonpositive(-bound)
         energy = energy + model.total(weights, bound)
     highest = np.array([limit.highest])
-    values = np.array([energy * transcript.duration * size], dtype=object)
+    values = model.times(np.array([transcript.duration * size]), energy)
     _rows(transcript, name, values, (-np.inf * highest, highest), np.array([0.5]))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -54,8 +54,10 @@ class Axis:
         """(time, ∫(peak - v) dt) of the shortest way up to a peak speed and down again within a power limit."""
         if peak == 0:
             return 0.0, 0.0
-        parts = [self._ramp(peak, power, limit) for limit in self.ramps]
-        return sum(p[0] for p in parts), sum(p[1] for p in parts)
+        up, down = self.ramps
+        first = self._ramp(peak, power, up)
+        last = first if down == up else self._ramp(peak, power, down)
+        return first[0] + last[0], first[1] + last[1]
 
     def _ramp(self, peak: float, power: float, acceleration: float) -> tuple[float, float]:
         steep, cap = self.jerk, (power / self.mass) ** 2 / 2
@@ -83,16 +85,20 @@ class Axis:
 
 def over_speed(height: Callable[[Floats, Floats], Floats], edges: list[float], peak: float) -> tuple[float, float]:
     """(time, ∫(peak - v) dt) of a ramp with y = ``height``(v, peak - v), smooth between ``edges``."""
-    time = lag = 0.0
-    for low, high in zip(edges, edges[1:], strict=False):
-        v, below, weight = between(low, high, peak)
-        pace = weight / np.sqrt(2 * height(v, below))
-        time, lag = time + float(pace.sum()), lag + float(pace @ below)
-    return time, lag
+    v, below, weight = between(*pieces(edges), peak)
+    pace = weight / np.sqrt(2 * height(v, below))
+    return float(pace.sum()), float(np.sum(pace * below))
 
 
-def between(low: float, high: float, peak: float) -> tuple[Floats, Floats, Floats]:
-    """(n,) speeds, peak - speed, and weights of a quadrature that tolerates square roots at both ends."""
+def pieces(edges: list[float]) -> tuple[Floats, Floats]:
+    """(k, 1) lower and upper ends of what lies between edges."""
+    ends = np.array(edges)[:, None]
+    return ends[:-1], ends[1:]
+
+
+def between(low: Any, high: Any, peak: float) -> tuple[Floats, Floats, Floats]:
+    """(n,) speeds, peak - speed, and weights of a quadrature that tolerates square roots at both ends; (k, n) of (k, 1)
+    ends."""
     share, weight = _rule()
     return low + (high - low) * share, (peak - high) + (high - low) * share[::-1], (high - low) * weight
 

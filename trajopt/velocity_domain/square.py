@@ -8,13 +8,14 @@ principle: over it the derivative of the integrand by y has integral zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import exp, isfinite, log, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
 
-from trajopt.velocity_domain.axis import Axis, between, over_speed
+from trajopt.velocity_domain.axis import Axis, between, over_speed, pieces
 from trajopt.velocity_domain.motor import Floats
 from trajopt.velocity_domain.power import least_peak, rising_root
 
@@ -33,7 +34,7 @@ def least_square_power(axis: Axis) -> SquareOptimum:
     low = least_peak(axis)
 
     def surplus(peak: float) -> float:
-        return sum(ramp.extent()[0] for ramp in _ramps(axis, peak)) - axis.duration
+        return sum(ramp.extent[0] for ramp in _ramps(axis, peak)) - axis.duration
 
     peak = rising_root(surplus, low * (1 + 1e-9), axis.velocity)
     value = sum(ramp.cost() for ramp in _ramps(axis, peak))
@@ -45,10 +46,12 @@ def _ramps(axis: Axis, peak: float) -> list[_Ramp]:
     target = peak * axis.duration - axis.distance
 
     def ramps(z: float) -> list[_Ramp]:
-        return [_Ramp(axis.mass, axis.jerk, limit, peak, exp(z)) for limit in axis.ramps]
+        up, down = axis.ramps
+        first = _Ramp(axis.mass, axis.jerk, up, peak, exp(z))
+        return [first, first if down == up else replace(first, acceleration=down)]
 
     def excess(z: float) -> float:
-        return log(sum(ramp.extent()[1] for ramp in ramps(z)) / target)
+        return log(sum(ramp.extent[1] for ramp in ramps(z)) / target)
 
     low = high = log(axis.mass**2 * peak**3 / axis.duration**2)
     while excess(high) > 0 and high < low + 60:
@@ -68,19 +71,17 @@ class _Ramp:
     peak: float
     price: float
 
+    @cached_property
     def extent(self) -> tuple[float, float]:
         """(time, ∫(peak - v) dt)."""
-        turn, join = self._fall()
+        turn, join = self._fall
         return over_speed(lambda v, below: self._height(v, below, turn, join), self._edges(turn, join), self.peak)
 
     def cost(self) -> float:
         """∫P² dt, W² s."""
-        turn, join = self._fall()
-        edges, total = self._edges(turn, join), 0.0
-        for low, high in zip(edges, edges[1:], strict=False):
-            v, below, weight = between(low, high, self.peak)
-            total += float(weight @ (self.mass**2 * v**2 * np.sqrt(2 * self._height(v, below, turn, join))))
-        return total
+        turn, join = self._fall
+        v, below, weight = between(*pieces(self._edges(turn, join)), self.peak)
+        return float(np.sum(weight * (self.mass**2 * v**2 * np.sqrt(2 * self._height(v, below, turn, join)))))
 
     def _free(self, v: float) -> float:
         """y0."""
@@ -107,6 +108,7 @@ class _Ramp:
         share = self.price / (self.mass * self.acceleration) ** 2
         return 2 * self.peak / (1 + sqrt(1 + 4 * self.peak / share))
 
+    @cached_property
     def _fall(self) -> tuple[float, float]:
         """The line y = J (turn - v) of the fall: ``turn``, and the speed at which it ends on y0."""
         if not isfinite(self.jerk):
