@@ -143,3 +143,54 @@ def test_the_least_time_is_that_of_the_scheme_that_the_objective_asks_for() -> N
     assert explanation["least_time_continuous"] < explanation["least_time"]
     at_least = problem.move.model_copy(update={"time": explanation["least_time"]})
     assert trajopt.solve(problem.replace(move=at_least)).status.solved
+
+
+OFF_THE_ORIGIN = {  # (limit, what it must be), shrunk from random problems
+    "a limit of zero, on a second rung": (
+        ('move={time="363.63 s", start={acceleration="-1.3077e-4 m/s^2"}, end={position="0 m"}}',
+         'limits={velocity=["0 m/s", "0.0832 m/s"]}', "transcription.intervals=16"), "velocity.min"),
+    "a position counted from a start that is not zero": (
+        ('move={time="347 s", start={position="0.134 mm", velocity="4.8e-8 m/s", acceleration="-2e-10 m/s^2"},'
+         ' end={position="0.1354 mm", velocity="-4.4e-8 m/s"}}',
+         'limits={position=["0.1338 mm", "0.1354 mm"]}', "transcription.intervals=5"), "position.max"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OFF_THE_ORIGIN)
+def test_the_least_change_of_a_limit_is_told_in_its_own_unit(case: str) -> None:
+    overrides, name = OFF_THE_ORIGIN[case]
+    problem = clemen_rupp(*overrides, 'objective={minimize="acceleration", norm="linf"}')
+    cure = trajopt.solve(problem).explanation["limits"][name]
+    by = cure["value"] - cure["now"]
+    assert possible(problem.with_limit(name, cure["now"] + by))
+    assert not possible(problem.with_limit(name, cure["now"] + by * 0.99))
+
+
+def test_a_least_time_far_below_the_scale_of_the_move_is_found() -> None:
+    """From 1 m/s to 1.4 m/s over 100 m with 1000 m/s² to speed up with: 0.44 s, where the move would take 83 s."""
+    problem = clemen_rupp(
+        'move={time="0.1 s", start={velocity="1 m/s"}, end={position="100 m", velocity="1.4 m/s"}}',
+        'limits={velocity={min="0 m/s"}, force={max="1e6 N"}}',
+        'load={mass="1000 kg", coulomb="1 N"}',
+        'objective={minimize="force", norm="linf"}',
+        "transcription.intervals=20",
+    )
+    least = trajopt.solve(problem).explanation["least_time"]
+    assert not possible(problem.replace(move=problem.move.model_copy(update={"time": least * 0.999})))
+    assert possible(problem.replace(move=problem.move.model_copy(update={"time": least})))
+
+
+def test_a_cure_that_leads_to_no_move_is_not_offered() -> None:
+    """Widened, the velocity limit would let the axis turn back against a friction that no force here overcomes."""
+    problem = clemen_rupp(
+        'move={time="0.1668 s", start={velocity="-0.124 m/s"}, end={position="0 m", velocity="-0.034 m/s"}}',
+        'limits={acceleration=["-15.7 m/s^2", "23.1 m/s^2"], force="365 N", velocity=["-1e3 m/s", "0 m/s"]}',
+        'load={mass="25.5 kg", coulomb="66.8 N"}',
+        'objective={minimize="power", norm="l1"}',
+        "transcription.intervals=16",
+    )
+    solution = trajopt.solve(problem)
+    assert solution.status is Verdict.IMPOSSIBLE
+    cure = solution.explanation["limits"]["velocity.max"]
+    assert cure["value"] is None and not cure["never"]
+    assert not any("alone is enough" in line for line in solution.explanation["text"] if not line.startswith("no "))

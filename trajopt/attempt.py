@@ -58,6 +58,7 @@ class Attempt:
     slope: float = np.nan  # SI objective per unit of the program's
     notes: dict[str, Any] = field(default_factory=dict)  # prices; starts and agreed; held by a tie-break; programs
     size: float = 1.0  # of the objective, SI
+    forgiven: float = 0.0  # see `trajopt.model.Outcome.forgiven`; SI
     convex: bool = True
 
     @property
@@ -115,7 +116,7 @@ def convex(
         best = replace(best, bound=bound)
         if clock.over:
             break
-        if best.trajectory is not None:  # as large as the move is, not as it could be
+        if best.trajectory is not None and not widen:  # as large as the move is; a widening is told in the first sizes
             setting = replace(setting, sizes=resized(setting.sizes, setting.problem, best.trajectory.chain))
     assert best is not None
     return best
@@ -191,6 +192,7 @@ def _read(setting: Setting, transcript: Transcript, lowered: Lowered, outcome: O
         lowered.si(outcome.bound),
         lowered.slope(outcome.value),
         size=lowered.scale,
+        forgiven=lowered.slope(outcome.value) * outcome.forgiven,
         convex=model.convex,
     )
 

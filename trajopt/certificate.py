@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 Floats = NDArray[np.float64]
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
 _PAID: Final = 1e-9  # of the value: what inexact stationarity may take off a bound without being mended
-_WAYS: Final = ((1e-13, False), (1e-13, True), (1e-17, True))  # see `_restored`: ridge, and whether all is moving
+_WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-16, 1e-17)))  # of `_restored`
 
 
 @dataclass(frozen=True)

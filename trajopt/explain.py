@@ -7,6 +7,7 @@ millionth.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -47,6 +48,21 @@ def explain(setting: Setting, clock: Clock) -> dict[str, Any]:
     found["conflict"] = _conflict(together, duration)
     found["text"] = _sentences(setting.problem, found)
     return found
+
+
+def tested(problem: Problem, found: dict[str, Any], works: Callable[[Problem], bool]) -> dict[str, Any]:
+    """An explanation without the cures after which no move was found: convex programs promise them, and do not know
+    the limits that make the problem, as it is or as it would be, nonconvex."""
+    limits = dict(found.get("limits", {}))
+    for name, cure in limits.items():
+        if cure["value"] is not None and not cure["varies"] and not works(problem.with_limit(name, cure["value"])):
+            limits[name] = cure | {"value": None, "factor": None}
+    found = found | {"limits": limits}
+    if (least := found.get("least_time")) is not None:
+        move = problem.move.model_copy(update={"time": least})
+        if not works(problem.model_copy(update={"move": move})):
+            found |= {"least_time": None}
+    return found | {"text": _sentences(problem, found)}
 
 
 def _kinematic(problem: Problem) -> dict[str, Limit]:

@@ -50,6 +50,7 @@ class Outcome:
     iterations: int = 0
     seconds: float = 0.0
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
+    forgiven: float = 0.0  # what the check lets pass in the rows, times multipliers: a bound may lie so far above
     prices: dict[str, Prices] = field(default_factory=dict)
     pair: tuple[Floats, Floats] | None = None  # the primal and dual vector, for `Model.lagrangian`
     proof: float = 0.0  # s, of ``seconds``, that our own bound took
@@ -60,10 +61,13 @@ class Model(Rows, Protocol):
 
     convex: bool
 
-    def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
+    def vector(
+        self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None, origin: float = 0.0
+    ) -> Any:
         """(count,) variables of the given size, with bounds (infinite where none) known to the solver as bounds.
 
-        ``name`` and ``at`` (count,) fractions of the duration are for their prices."""
+        ``name``, ``at`` (count,) fractions of the duration and ``origin``, to which the limits as stated add up with
+        the bounds, are for their prices."""
 
     def zero(self, residual: Any, size: float = 1.0) -> None:
         """Demand ``residual == 0``; ``size`` scales the row."""

@@ -53,7 +53,9 @@ class ConvexModel:
         self._objective = Affine.of(0.0)
         self._answer: Floats | None = None
 
-    def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
+    def vector(
+        self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None, origin: float = 0.0
+    ) -> Any:
         x = self.variable(count) * size
         for bound, sign, side in ((lower, -1.0, "min"), (upper, 1.0, "max")):
             active = np.flatnonzero(np.isfinite(bound))
@@ -62,7 +64,7 @@ class ConvexModel:
                 limit = bound[active]
                 key, where = (f"{name}.{side}", at[active]) if at is not None else ("", None)
                 row_size = max(size, float(np.max(np.abs(limit))))
-                self.nonpositive(sign * some - sign * limit, row_size, key, where, own_size(limit, size))
+                self.nonpositive(sign * some - sign * limit, row_size, key, where, own_size(limit + origin, size))
         return x
 
     def variable(self, count: int) -> Affine:
@@ -156,8 +158,10 @@ class ConvexModel:
             value = program.value(x) + constant
             bound = certificate.lower_bound(program, x, z) + constant
         ended = perf_counter()
-        prices = self._prices(z[program.zero :])
-        return Outcome(claim, status, value, iterations, ended - started, bound, prices, (x, z), ended - solved)
+        return Outcome(
+            claim, status, value, iterations, ended - started, bound, _EXCESS * float(np.abs(z).sum()),
+            self._prices(z[program.zero :]), (x, z), ended - solved,
+        )  # fmt: skip
 
     def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
         program, (x, z) = self.program, pair
@@ -176,6 +180,7 @@ class ConvexModel:
             }
 
 
+_EXCESS: Final = 1e-6  # of a row, which has size one: what a move that passes the check may exceed it by
 _CLAIMS: Final = {
     cp.OPTIMAL: Claim.OPTIMAL,
     cp.OPTIMAL_INACCURATE: Claim.INACCURATE,

@@ -51,7 +51,9 @@ class NonconvexModel:
         self._contradiction = ""
         self._curves: list[Along] = []
 
-    def vector(self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None) -> Any:
+    def vector(
+        self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None, origin: float = 0.0
+    ) -> Any:
         def bounds(_: Any, k: int) -> tuple[float | None, float | None]:
             low, high = float(lower[k]) / size, float(upper[k]) / size
             return (low if np.isfinite(low) else None), (high if np.isfinite(high) else None)
@@ -59,18 +61,21 @@ class NonconvexModel:
         variables = pyo.Var(range(count), bounds=bounds)
         x = self._add(variables, count, size, name)
         if at is not None:
-            self._bounded(variables, name, size, (lower, upper), at)
+            self._bounded(variables, name, size, (lower, upper), at, origin)
         return x
 
     def variable(self, count: int) -> Any:
         return self._add(pyo.Var(range(count), initialize=1.0), count, 1.0)
 
-    def _bounded(self, variables: Any, name: str, size: float, bounds: tuple[Floats, Floats], at: Floats) -> None:
+    def _bounded(
+        self, variables: Any, name: str, size: float, bounds: tuple[Floats, Floats], at: Floats, origin: float
+    ) -> None:
         for side, bound in (("min", bounds[0]), ("max", bounds[1])):
             active = np.flatnonzero(np.isfinite(bound))
             if len(active):
                 some = [variables[int(k)] for k in active]
-                self._named.append((f"{name}.{side}", some, size, at[active], own_size(bound[active], size)))
+                own = own_size(bound[active] + origin, size)
+                self._named.append((f"{name}.{side}", some, size, at[active], own))
 
     def _add(self, variables: Any, count: int, size: float, name: str = "") -> Any:
         name = unique_component_name(self._model, name or "x")  # axes have variables of one name

@@ -12,7 +12,7 @@ import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
 from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import findings
-from trajopt.explain import explain_power
+from trajopt.explain import explain_power, tested
 from trajopt.model import Claim, Outcome
 from trajopt.power import descend, linearised, relax
 from trajopt.prices import prices
@@ -40,7 +40,7 @@ def solve(problem: Problem, seconds: float | None = None, start: Trajectory | No
     clock = Clock(seconds)
     solution = _solve(problem, clock, start)
     if solution.trajectory is None:
-        return solution
+        return _with_tested_cures(solution, clock)
     since = perf_counter()
     certificate, structure = findings(problem, solution.trajectory, solution.metrics)
     if solution.certificate["lower_bound"] is None and (least := floor(problem)) is not None:
@@ -50,6 +50,25 @@ def solve(problem: Problem, seconds: float | None = None, start: Trajectory | No
     clock.charge("continuous time", since)
     found = {**solution.certificate, **certificate}
     return replace(solution, certificate=found, structure={**structure, **solution.structure}, timings=clock.timings())
+
+
+def _with_tested_cures(solution: Solution, clock: Clock) -> Solution:
+    if not solution.explanation.get("limits") or solution.explanation.get("least_peak_power"):
+        return solution
+    since = perf_counter()
+    explanation = tested(solution.problem, dict(solution.explanation), lambda cured: _works(cured, clock))
+    clock.charge("explain", since)
+    return replace(solution, explanation=explanation, timings=clock.timings())
+
+
+def _works(problem: Problem, clock: Clock) -> bool:
+    """Whether a move is found where that is in doubt: for a problem that is nonconvex."""
+    nonaffine = nonaffine_limits(problem)
+    if not nonaffine or clock.over:
+        return not nonaffine
+    setting = Setting.of(problem)
+    answer = _from_several_starts(setting, without(setting, nonaffine), clock)
+    return answer.trajectory is not None and conclude(setting, route(problem), answer, clock, local=True).status.solved
 
 
 def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution:

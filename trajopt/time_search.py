@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,6 +24,7 @@ from trajopt.transcribe import Setting
 
 _RELATIVE = 1e-10  # of the duration: how close the search brackets it
 _SLACK = 1e-9  # of the stroke: an end on a position limit is reached, never passed
+_LEAST: Final = 1e-6  # of the longest duration in the grid of those that are scanned
 _LONGEST = 1e6  # times the first estimate: beyond it the limits cannot be meant
 
 
@@ -77,6 +79,8 @@ def feasible_times(
     if near:
         grid = np.unique([t * beside for t in near for beside in (0.98, 1.02)])
     try:
+        while not near and grid[0] > _LEAST * grid[-1] and coarse.margin(float(grid[0])) >= 0:
+            grid = np.concatenate([[grid[0] / 2], grid])  # until the least possible time lies within the grid
         inside = [coarse.margin(float(t)) >= 0 for t in grid]
         borders = [(a, b) for a, b, was, now in zip(grid, grid[1:], inside, inside[1:], strict=False) if was != now]
         edges = [_edge(search, float(a), float(b)) for a, b in borders]

@@ -171,7 +171,8 @@ def _variables(
         if f"{name}.max" in widen:
             upper = np.full(len(upper), np.inf)
         places = mesh.places(top=i == problem.order)
-        chain.append(model.vector(len(lower), sizes.derivative[i], lower, upper, name, places))
+        origin = origin_of(problem, name)
+        chain.append(model.vector(len(lower), sizes.derivative[i], lower, upper, name, places, origin))
     return chain
 
 
@@ -195,9 +196,14 @@ def sides(problem: Problem, i: int, limit: Limit, duration: Any, fractions: Floa
     """A limit at fractions of the duration; that of position (i = 0) as displacement from the start."""
     times = fractions * (duration if isinstance(duration, float) else 1.0)
     lower, upper = limit.at(times)
-    origin = (problem.move.start_position or 0.0) if i == 0 else 0.0
+    origin = origin_of(problem, DERIVATIVES[i]) if i >= 0 else 0.0
     infinite = np.full(len(fractions), np.inf)
     return (-infinite if lower is None else lower - origin), (infinite if upper is None else upper - origin)
+
+
+def origin_of(problem: Problem, name: str) -> float:
+    """What the chain's position is counted from, m or rad; zero for all other signals."""
+    return (problem.move.start_position or 0.0) if name == "position" else 0.0
 
 
 def _limit(transcript: Transcript, name: str, limit: Limit) -> None:
@@ -315,7 +321,8 @@ def _rows(
             continue
         some = values if len(active) == len(bound) else values[active]
         residual = sign * (some - bound[active])
+        own = own_size(bound[active] + origin_of(transcript.problem, name), size)
         if key in transcript.widen:
-            residual = residual - transcript.widen[key] * own_size(bound[active], size)
+            residual = residual - transcript.widen[key] * own
         row_size = max(size, float(np.max(np.abs(bound[active]))))
-        model.nonpositive(residual, row_size, key, at[active], own_size(bound[active], size))
+        model.nonpositive(residual, row_size, key, at[active], own)
