@@ -186,6 +186,8 @@ class _Search:
         attempt = self._farthest(duration, sign)
         if attempt.outcome.claim is Claim.INFEASIBLE:
             return -self._setting.sizes.derivative[0]
+        if attempt.outcome.claim is Claim.UNBOUNDED:
+            return np.inf
         return -(attempt.bound if certified else attempt.value) - sign * self._target
 
     def attempt(self, duration: float) -> Attempt:
@@ -199,6 +201,7 @@ class _Search:
             raise _Stopped(Outcome(Claim.LIMIT, "time limit"))
         self.programs += 1
         attempt = self._known[duration, sign] = farthest(self._setting, duration, sign, self._clock)
-        if attempt.trajectory is None and attempt.outcome.claim is not Claim.INFEASIBLE:
+        sideways = attempt.outcome.claim is Claim.UNBOUNDED and sign != self.forward  # no limit on that side: no matter
+        if attempt.trajectory is None and attempt.outcome.claim is not Claim.INFEASIBLE and not sideways:
             raise _Stopped(attempt.outcome)
         return attempt
