@@ -12,7 +12,7 @@ import numpy as np
 from trajopt import checker, friction
 from trajopt.attempt import Attempt, Clock, convex, smoothest, to
 from trajopt.errors import InternalError
-from trajopt.explain import explain
+from trajopt.explain import at_longest, explain
 from trajopt.metrics import metrics
 from trajopt.model import Claim
 from trajopt.routing import Route, nonaffine_limits
@@ -82,11 +82,11 @@ def _unsolved(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock) -
     """A verdict without numbers. A move that is impossible in its time, or the longest of its range, is explained."""
     problem, outcome = setting.problem, attempt.outcome
     status, explanation = _VERDICTS.get(outcome.claim, Verdict.UNDECIDED), {}
-    longest = problem.move.time[1] if isinstance(problem.move.time, tuple) else problem.move.fixed_time
+    at_longest_time = at_longest(problem)
+    longest = at_longest_time.move.fixed_time
     if status is Verdict.IMPOSSIBLE_ON_GRID and longest is not None:
         since = perf_counter()
-        move = problem.move.model_copy(update={"time": longest})
-        longest_move = replace(setting, problem=problem.model_copy(update={"move": move}))
+        longest_move = replace(setting, problem=at_longest_time)
         tried = without(longest_move, nonaffine_limits(problem))
         explanation = _by_ceilings(longest_move, longest, clock) or explain(tried, clock)
         if explanation["continuous"]:

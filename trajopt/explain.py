@@ -62,7 +62,14 @@ def tested(problem: Problem, found: dict[str, Any], works: Callable[[Problem], b
         move = problem.move.model_copy(update={"time": least})
         if not works(problem.model_copy(update={"move": move})):
             found |= {"least_time": None}
-    return found | {"text": _sentences(problem, found)}
+    return found | {"text": _sentences(at_longest(problem), found)}
+
+
+def at_longest(problem: Problem) -> Problem:
+    """The problem in the longest time of its range, which is what is explained."""
+    time = problem.move.time
+    move = problem.move.model_copy(update={"time": time[1] if isinstance(time, tuple) else time})
+    return problem.model_copy(update={"move": move})
 
 
 def _kinematic(problem: Problem) -> dict[str, Limit]:

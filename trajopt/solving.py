@@ -55,10 +55,8 @@ def solve(problem: Problem, seconds: float | None = None, start: Trajectory | No
 def _with_tested_cures(solution: Solution, clock: Clock) -> Solution:
     if not solution.explanation.get("limits") or solution.explanation.get("least_peak_power"):
         return solution
-    since, problem = perf_counter(), solution.problem
-    if isinstance(problem.move.time, tuple):  # the longest of a range is what is explained
-        problem = problem.replace(move=problem.move.model_copy(update={"time": problem.move.time[1]}))
-    explanation = tested(problem, dict(solution.explanation), lambda cured: _works(cured, clock))
+    since = perf_counter()
+    explanation = tested(solution.problem, dict(solution.explanation), lambda cured: _works(cured, clock))
     clock.charge("explain", since)
     return replace(solution, explanation=explanation, timings=clock.timings())
 
