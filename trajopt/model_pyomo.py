@@ -28,6 +28,13 @@ _OPTIONS: Final = {
     "print_level": 0,
     "sb": "yes",
 }
+RUNGS: Final[dict[str, dict[str, Any]]] = {  # other ways through the barrier: each may end in another local optimum
+    "ipopt": {},
+    "ipopt-adaptive": {"mu_strategy": "adaptive"},
+    "ipopt-warm": {
+        "mu_init": 1e-7, "bound_push": 1e-9, "bound_frac": 1e-9, "slack_bound_push": 1e-9, "slack_bound_frac": 1e-9,
+    },
+}  # fmt: skip
 _BEYOND: Final = 0.02  # of its span: how far beyond a table Ipopt may look
 ELEMENTWISE: Final = {"sin": np.frompyfunc(pyo.sin, 1, 1), "cos": np.frompyfunc(pyo.cos, 1, 1)}
 _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: they prove nothing
@@ -196,7 +203,7 @@ class NonconvexModel:
         for along in self._curves:
             along.start(self.value(along.position))
         nlp, problem, deadline = _interface(self._model, self._curves, seconds)
-        for option, setting in _OPTIONS.items():
+        for option, setting in (_OPTIONS | RUNGS[solver]).items():
             problem.add_option(option, setting)
         x, info = problem.solve(nlp.init_primals())
         status = int(info["status"])

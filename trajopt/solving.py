@@ -268,7 +268,7 @@ def _kept(setting: Setting, chosen: Route, answer: Attempt, clock: Clock) -> Sol
             break
         share += 1.05 * excess
         goal = to(setting.problem.objective)
-        inner = nonconvex(drawn_in(setting, share), goal, clock, answer.trajectory)
+        inner = nonconvex(drawn_in(setting, share, sampled=True), goal, clock, answer.trajectory)
         if inner.trajectory is None:
             break
         inner = replace(inner, bound=answer.bound, notes=answer.notes)

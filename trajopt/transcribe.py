@@ -48,13 +48,14 @@ def without(setting: Setting, names: Sequence[str]) -> Setting:
     return replace(setting, problem=setting.problem.model_copy(update={"limits": limits}))
 
 
-def drawn_in(setting: Setting, share: float) -> Setting:
-    """The setting with every constant limit drawn in by a share of itself, but not past a prescribed state."""
+def drawn_in(setting: Setting, share: float, sampled: bool = False) -> Setting:
+    """The setting with every constant limit drawn in by a share of itself, but not past a prescribed state;
+    ``sampled``: only those of force and what follows from it, which some loads make no polynomials of."""
     move = setting.problem.move
     states = [state.fixed(setting.problem.order, None) for state in (move.start, move.end, *move.via)]
 
     def side(name: str, bound: float | Table | None, sign: float) -> float | Table | None:
-        if not isinstance(bound, float) or name == "position":
+        if not isinstance(bound, float) or name == "position" or (sampled and name in DERIVATIVES):
             return bound
         i = DERIVATIVES.index(name) if name in DERIVATIVES else -1
         given = [sign * state[i] for state in states if i in state]

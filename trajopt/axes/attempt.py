@@ -28,8 +28,8 @@ class AxesAttempt:
     value: float = np.nan
 
 
-def run(setting: AxesSetting, start: Guess, clock: Clock) -> AxesAttempt:
-    """A local optimum by Ipopt, from a start."""
+def run(setting: AxesSetting, start: Guess, clock: Clock, rung: str = "ipopt") -> AxesAttempt:
+    """A local optimum by Ipopt, from a start; ``rung``: one of `trajopt.model_pyomo.RUNGS`."""
     from trajopt.model_pyomo import NonconvexModel
 
     since, model = perf_counter(), NonconvexModel()
@@ -42,7 +42,7 @@ def run(setting: AxesSetting, start: Guess, clock: Clock) -> AxesAttempt:
     model.minimize(lowered.expression)
     clock.charge("model", since)
     since = perf_counter()
-    outcome = model.run("ipopt", clock.left())
+    outcome = model.run(rung, clock.left())
     clock.charge("solve", since)
     if outcome.claim is not Claim.OPTIMAL:
         return AxesAttempt(outcome)

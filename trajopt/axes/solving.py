@@ -7,9 +7,12 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any, Final
 
+import numpy as np
+
 from trajopt import checker
 from trajopt.attempt import Clock
 from trajopt.axes.attempt import AxesAttempt, on_mesh, run
+from trajopt.axes.between import drawn_in, excess, restored
 from trajopt.axes.explain import explain, forward_only_speed
 from trajopt.axes.motion import Motion
 from trajopt.axes.problem import AxesProblem
@@ -18,6 +21,7 @@ from trajopt.axes.solution import AxesSolution
 from trajopt.axes.starts import Guess, guesses
 from trajopt.axes.synchronise import synchronise
 from trajopt.axes.transcription import AxesSetting
+from trajopt.conclude import KEPT
 from trajopt.model import Claim
 from trajopt.problem import FREE, Problem
 from trajopt.routing import route
@@ -25,6 +29,7 @@ from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
 _SAME: Final = 1e-4  # relative: coarse optima within it are one
+_ROUNDS: Final = 6  # of drawing in
 _REFINED: Final = 2  # how many of the distinct ones are refined
 
 
@@ -38,17 +43,14 @@ def solve(problem: AxesProblem, seconds: float | None = None) -> AxesSolution:
     if not found:
         return _failed(unsolved, starts, clock)
     certificate = _certificate(len(starts), [attempt.value for attempt in found])
-    setting, best = AxesSetting.of(problem), None
-    for coarse in _distinct(found)[:_REFINED]:
-        assert coarse.motion is not None
-        fine = run(setting, Guess.from_motion(coarse.motion), clock)
-        if fine.motion is not None and (best is None or fine.value < best.value):
-            best = fine
-    if best is None or best.motion is None:
+    best = _refined(AxesSetting.of(problem), _distinct(found)[:_REFINED], clock)
+    if best.motion is None:
         message = f"{len(found)} of {len(starts)} coarse starts were feasible, but none could be refined"
         return replace(unsolved, status=_late(clock), timings=clock.timings(), message=message)
+    best = _kept(AxesSetting.of(problem), best, clock)
     if (forward := forward_only_speed(problem)) is not None:
         certificate["forward_only_bound"] = forward
+    assert best.motion is not None
     return _concluded(unsolved, best.motion, certificate, clock, Verdict.SOLVED_LOCAL)
 
 
@@ -65,6 +67,46 @@ def _search(problem: AxesProblem, clock: Clock) -> tuple[list[AxesAttempt], list
         if clock.over:
             break
     return tried, sorted((a for a in tried if a.motion is not None), key=lambda attempt: attempt.value)
+
+
+def _refined(setting: AxesSetting, found: list[AxesAttempt], clock: Clock) -> AxesAttempt:
+    """The best that becomes of coarse optima on the asked mesh, and once more from there, warm: where the objective is
+    flat, other optima lie near."""
+    ends = [_run(setting, coarse, clock, "ipopt-adaptive") for coarse in found]
+    best = min(ends, key=_rank)
+    if best.motion is None:
+        best = min((_run(setting, coarse, clock, "ipopt") for coarse in found), key=_rank)
+    if best.motion is None or clock.over:
+        return best
+    return min(best, _run(setting, best, clock, "ipopt-warm"), key=_rank)
+
+
+def _kept(setting: AxesSetting, best: AxesAttempt, clock: Clock) -> AxesAttempt:
+    """The best, with what slips between its nodes drawn in by as much, and found again from there."""
+    share = 0.0
+    for _ in range(_ROUNDS):
+        assert best.motion is not None
+        over = excess(best.motion)
+        if over <= KEPT or clock.over:
+            break
+        share += 1.05 * over
+        tighter = drawn_in(setting, share)
+        ends = (_run(tighter, best, clock, rung) for rung in ("ipopt-warm", "ipopt"))
+        inner = next((end for end in ends if end.motion is not None), None)
+        if inner is None or inner.motion is None:
+            break
+        motion = restored(inner.motion, setting.problem)
+        best = replace(inner, motion=motion, value=motion.objective)
+    return best
+
+
+def _run(setting: AxesSetting, start: AxesAttempt, clock: Clock, rung: str) -> AxesAttempt:
+    assert start.motion is not None
+    return run(setting, Guess.from_motion(start.motion), clock, rung)
+
+
+def _rank(attempt: AxesAttempt) -> float:
+    return np.inf if attempt.motion is None else attempt.value
 
 
 def _shown(starts: Iterator[Guess], count: int) -> Iterator[Guess]:

@@ -3,7 +3,7 @@
 The kinematics of every axis go to the two twins. Torque and power of an arm are recomputed by a formulation of the
 checker's own (`trajopt.checker.arm`) and followed between the nodes by the polynomial through their values on every
 interval. Tolerances, relative: as for moves; limits on torque and power, and the width of a path, which are held at the
-nodes, 1e-6 there and 1e-3 (2e-2) between them; tip velocity 1e-6; energy against the work of the joints 1e-6.
+nodes, 1e-6 there and 1e-5 between them; tip velocity 1e-6; energy against the work of the joints 1e-6.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from trajopt.checker.result_file import _text as read_text
 from trajopt.checker.tip import on_the_path, path_of, thrown
 
 __all__ = ["FORMAT", "axes_checks", "motion_table_fault"]
-_BETWEEN: Final = 1e-3  # of a limit on torque or power, which is held at the nodes
+_BETWEEN: Final = 1e-5  # of a limit on torque or power, which samples between the nodes hold
 _SMOOTH: Final = 1e-7  # of the peak torque: what the polynomials may miss it by
 _TIME: Final = 1e-12
 _PRINTED: Final = 1e-15

@@ -13,7 +13,7 @@ from trajopt.checker.case import Array
 from trajopt.checker.reading import _mapping, _number, _vector
 from trajopt.checker.report import Check, question
 
-_TUBE: Final = 2e-2  # of the width of a path, between the nodes
+_TUBE: Final = 1e-5  # of the width of a path, between the nodes
 _TIP: Final = 1e-6
 _TIME: Final = 1e-9  # of the duration: how far a release may be from a node
 
