@@ -850,6 +850,8 @@ class Program:
 def program(spec: Spec, intervals: int | None = None) -> Program | None:
     """Our own program, where it applies."""
     friction = spec.load.get("coulomb") and not spec.one_way and "force" in spec.limits
+    if "position" in spec.limits and 0 not in spec.state("start"):  # positions are displacements here
+        return None
     if spec.tables or spec.via or friction or "power" in spec.limits or not isinstance(spec.duration, float):
         return None
     if (intervals or spec.intervals) > 130:
