@@ -33,7 +33,7 @@ class Case:
             limits=trajopt.Limits(velocity=VELOCITY, acceleration=ACCELERATION, jerk=JERK),
             load=trajopt.Load(inertia=MASS),
             objective=trajopt.Objective(terms=tuple(terms)),
-            transcription=trajopt.Transcription(intervals=intervals, allow_large=True),
+            transcription=trajopt.Transcription(intervals=intervals),
         )
 
 

@@ -218,7 +218,7 @@ def test_what_is_drawn_is_lowered_as_it_is_measured(recovery: float) -> None:
     model.run("clarabel")
     measured = intake.measure(x, weights, 2.0)
     assert measured == pytest.approx(2.0 * (0.25 - recovery * 0.44), rel=1e-12)
-    assert float(model.value(value)) == pytest.approx(measured, abs=1e-8)
+    assert model.value(value).item() == pytest.approx(measured, abs=1e-8)
     assert intake.measure(3.0 * x, weights, 2.0) == pytest.approx(3.0 * measured, rel=1e-12)  # scaling relies on it
 
 
