@@ -72,7 +72,7 @@ class FloatTwin:
             reach = 1 if self.euler else self.case.order - i
             terms = [self.step**j / math.factorial(j) * self.left[i + j][:-1] for j in range(1, reach + 1)]
             given = np.diff(self.left[i])  # first, so that a far-off origin costs no digits
-            sizes = [float(np.max(np.abs(term))) for term in (*terms, given)]
+            sizes = [float(np.abs(term).max()) for term in (*terms, given)]
             found.append((np.sum(terms, axis=0) - given, 8 * EPS * sum(sizes)))
         return found
 
@@ -129,7 +129,7 @@ class FloatTwin:
             velocity = bernstein(self.rows(1, mixed))
             whole = np.all(velocity >= -self.case.rest, axis=1) | np.all(velocity <= self.case.rest, axis=1)
             done.append(mixed.take(whole))
-            if np.all(whole):
+            if whole.all():
                 break
             mixed = mixed.take(~whole).halved()
         else:
@@ -143,8 +143,8 @@ class FloatTwin:
         bounds = bernstein(rows)
         found: list[float] = []
         for spline in self.case.splines:
-            first = np.searchsorted(spline.breaks, np.min(bounds, axis=1))
-            last = np.searchsorted(spline.breaks, np.max(bounds, axis=1))
+            first = np.searchsorted(spline.breaks, bounds.min(axis=1))
+            last = np.searchsorted(spline.breaks, bounds.max(axis=1))
             for k in np.flatnonzero(last > first):
                 start, length = self.case.time[self.pieces.interval[k]] + self.pieces.offset[k], self.pieces.length[k]
                 for knot in spline.breaks[first[k] : last[k]]:
@@ -238,7 +238,7 @@ class FloatTwin:
     def friction(self, velocity: Array, at_rest: float) -> Array:
         """Coulomb friction on each piece, from the coefficients of its velocity."""
         values = bernstein(velocity)
-        forward, backward = np.max(values, axis=1) > self.case.rest, np.min(values, axis=1) < -self.case.rest
+        forward, backward = values.max(axis=1) > self.case.rest, values.min(axis=1) < -self.case.rest
         return np.where(forward, self.case.coulomb, np.where(backward, -self.case.coulomb, at_rest))
 
     # at the nodes
@@ -325,13 +325,13 @@ class FloatTwin:
         """How large a quantity gets, never too small; of a position the largest excursion."""
         origin = self.case.signal[0][0] if name == "position" else 0.0
         values = self.samples(name)[0] if self.euler else self.polynomial(name)[1]
-        return float(np.max(np.abs(values - origin)))
+        return float(np.abs(values - origin).max())
 
     @cached_property
     def magnitudes(self) -> tuple[float, ...]:
         """By derivative: the sum of what its polynomials are summed from, for bounds on rounding."""
-        peaks = [float(np.max(np.abs(values))) for values in self.case.signal]
-        longest = 0.0 if self.euler else float(np.max(self.step))
+        peaks = [float(np.abs(values).max()) for values in self.case.signal]
+        longest = 0.0 if self.euler else float(self.step.max())
         return tuple(
             sum(longest**j / math.factorial(j) * peak for j, peak in enumerate(peaks[i:])) for i in range(len(peaks))
         )
@@ -353,11 +353,11 @@ class FloatTwin:
 
     def noise_along(self, spline: Spline) -> float:
         """How large what a spline adds to force can get, its digits lost in differences of rows included."""
-        size, slope = float(np.max(np.abs(spline.value))), spline.at(spline.position, 1)
+        size, slope = float(np.abs(spline.value).max()), spline.at(spline.position, 1)
         if spline is self.case.force:
             return size
         lost = size / float(np.min(np.diff(spline.position)))
-        return float((np.max(np.abs(slope)) + lost) * self.magnitudes[1] ** 2)
+        return float((np.abs(slope).max() + lost) * self.magnitudes[1] ** 2)
 
     # answers
 
@@ -405,7 +405,7 @@ class FloatTwin:
         rows = self.polynomial(name, -side * self.case.coulomb if self.case.is_loaded(name) else 0.0)[1]
         over = side * (rows - self.limit_rows(limit, self.pieces_of(name), rows.shape[1] - 1))
         slack = tolerance * 1e-3
-        if np.max(over) <= slack:
+        if over.max() <= slack:
             return Found(0.0)
         value, piece, s = highest(over, slack, 0.0)
         interval, offset, length = (values[piece] for values in self.pieces_of(name))
@@ -543,4 +543,4 @@ def _norm(norm: str | None, values: Array, weights: Array, duration: float) -> f
         return float(weights @ np.abs(values))
     if norm == "l2":
         return math.sqrt(weights @ np.square(values) / duration)
-    return float(np.max(np.abs(values))) if norm == "linf" else 0.0
+    return float(np.abs(values).max()) if norm == "linf" else 0.0

@@ -71,11 +71,11 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
         k = int(np.argmax(ends))
         if ends[k] > best:
             best, where = float(ends[k]), (int(index[k]), float(start[k] + (0.0 if rows[k, 0] == ends[k] else width)))
-        bounds = np.max(rows, axis=1)
+        bounds = rows.max(axis=1)
         still_open = ~(bounds <= best + slack + relative * best)
-        if not np.any(still_open):
+        if not still_open.any():
             return best, *where
-        if np.count_nonzero(still_open) > crowd or not math.isfinite(float(np.max(bounds))):
+        if np.count_nonzero(still_open) > crowd or not math.isfinite(float(bounds.max())):
             break
         rows, width = _halves(rows[still_open]), width / 2
         index, start = np.tile(index[still_open], 2), np.concatenate([start[still_open], start[still_open] + width])
@@ -84,7 +84,7 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
 
 def absolute_integral(rows: Array, length: Array) -> float:
     """The integral of |p| over all pieces, split where p changes its sign."""
-    total, slack = 0.0, 1e-13 * np.max(np.abs(rows))
+    total, slack = 0.0, 1e-13 * np.abs(rows).max()
     enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
     for _ in range(60):
         whole = np.all(rows >= -slack, axis=1) | np.all(rows <= slack, axis=1)
@@ -121,7 +121,7 @@ def both_signs(function: Callable[[Integers, Array], Array], length: Array) -> t
         sums = fine.sum(axis=0) * span
         still_open = np.any(np.abs(sums - 2 * span * coarse) > enough, axis=1)
         total += sums[~still_open].sum(axis=0)
-        if not np.any(still_open):
+        if not still_open.any():
             break
         index, width = np.tile(index[still_open], 2), np.tile(half[still_open], 2)
         start = np.concatenate([start[still_open], start[still_open] + half[still_open]])

@@ -103,7 +103,7 @@ def _limit_tolerance(case: Case, name: str, peak: float, relative: float) -> flo
     origin = float(case.signal[0][0]) if name == "position" else 0.0
     instants = np.array([0.0, *case.corners, case.end_time])
     sides = [side.at(instants) - origin for side in case.limits[name] if side is not None]
-    largest = max((float(np.max(np.abs(side))) for side in sides), default=0.0)
+    largest = max((float(np.abs(side).max()) for side in sides), default=0.0)
     coordinate = 4 * EPS * case.largest_position if name == "position" else 0.0
     return relative * min(largest or peak, peak) + coordinate
 

@@ -165,14 +165,16 @@ def _whole(value: Any, where: str) -> int:
 
 def _finite(value: Any, where: str) -> None:
     """Every number anywhere in the problem is finite."""
-    if isinstance(value, Mapping):
+    if value is None or isinstance(value, str | bool):
+        return
+    if isinstance(value, int | float):
+        _number(value, where)
+    elif isinstance(value, Mapping):
         for key, item in value.items():
             _finite(item, f"{where}.{key}")
     elif isinstance(value, list | tuple):
         for item in value:
             _finite(item, where)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        _number(value, where)
 
 
 def _vector(values: Any, where: str) -> Array:
