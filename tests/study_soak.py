@@ -19,7 +19,7 @@ POISON: Final = ("crash", "leave", "eat", "hang")
 SMALL: Final[dict[str, Any]] = {
     "move": {"time": "1 s", "end": {"position": "100 mm"}},
     "objective": {"minimize": "jerk", "norm": "l2"},
-    "transcription": {"intervals": 8},
+    "transcription": {"intervals": 50},
 }
 
 
@@ -61,7 +61,7 @@ def _memory(process: psutil.Process) -> int:
 
 def poison(count: int, workers: int) -> dict[str, Any]:
     """A clean run and a spoilt one: what went wrong, and how times and memory compare."""
-    options = Options(workers=workers, limits=Limits(2.0, 3 << 30), function="tests.study_faults:poisoned")
+    options = Options(workers=workers, limits=Limits(1.0, 3 << 30), function="tests.study_faults:poisoned")
     memory, took, reports = Memory(), [], []
     for spoilt in (False, True):
         with tempfile.TemporaryDirectory() as folder:

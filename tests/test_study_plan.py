@@ -143,3 +143,18 @@ def test_a_plan_is_frozen_and_its_content_a_copy() -> None:
     assert json.dumps(made.content(made.cases[0]))[:40] == json.dumps(made.content(made.cases[1]))[:40]
     with pytest.raises(AttributeError):
         made.cases[0].number = 3  # type: ignore[misc]
+
+
+def test_the_tables_that_a_problem_names_beside_its_file_come_with_its_cases(tmp_path: Path) -> None:
+    """A worker, perhaps on another machine, sees the content of a case and no folder."""
+    made = plan.from_dict({"problem": "slider_crank", "grid": {"move.time": ["73.5 ms", "80 ms"]}})
+    assert _hashes(made)[0] == trajopt.load("slider_crank").hash
+    (tmp_path / "other.csv").write_text("theta [deg],T [N m]\n" + "".join(f"{20 * i},0.5\n" for i in range(10)))
+    varied = {"load.torque": [{"csv": "slider_crank.csv"}, {"csv": "other.csv"}]}
+    with pytest.raises(trajopt.BadInput, match=r"load.torque: .*slider_crank.csv: cannot be read"):
+        plan.from_dict({"problem": "slider_crank", "grid": varied}, folder=tmp_path)
+    del varied["load.torque"][0]
+    made = plan.from_dict({"problem": "slider_crank", "grid": varied}, folder=tmp_path)
+    problem = problem_file.from_dict(made.content(made.cases[0]))
+    assert isinstance(problem, trajopt.Problem) and problem.load.force is not None
+    assert set(problem.load.force.value) == {0.5}

@@ -6,7 +6,7 @@ inertia and the J' in the torque are one function and its exact slope, and Newto
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -121,9 +121,7 @@ def read_curve(value: Any, kind: str, info: ValidationInfo) -> Curve:
     """A Curve from ``{ position = [...], value = [...] }`` or ``{ csv = "file" }``, beside the problem file."""
     refuse_unknown(value, ("position", "value", "csv", "column"))
     if "csv" in value:
-        if "position" in value or "value" in value:
-            raise ValueError("give either csv, or position and value, not both")
-        return _from_file(value, kind, info)
+        return _from_file(value, kind, info.context or {})
     for key in ("position", "value"):
         if key not in value:
             raise ValueError(f'{key}: is missing; write position = ["0 deg", "1 deg", ...] and value = [...]')
@@ -131,11 +129,20 @@ def read_curve(value: Any, kind: str, info: ValidationInfo) -> Curve:
     return Curve(position=tuple(position), value=tuple(si(x, kind, info) for x in sequence(value["value"], "value")))
 
 
-def _from_file(value: Any, kind: str, info: ValidationInfo) -> Curve:
+def written_out(value: Mapping[str, Any], kind: str, context: Mapping[str, Any]) -> dict[str, list[str]]:
+    """``{ csv = "file" }`` as ``{ position = [...], value = [...] }``. Raises ValueError."""
+    refuse_unknown(value, ("position", "value", "csv", "column"))
+    curve, known = _from_file(value, kind, context), units.kinds(bool(context.get("rotary")))
+    columns = {"position": (curve.position, "position"), "value": (curve.value, kind)}
+    return {key: [f"{x!r} {known[of].unit}" for x in numbers] for key, (numbers, of) in columns.items()}
+
+
+def _from_file(value: Mapping[str, Any], kind: str, context: Mapping[str, Any]) -> Curve:
     from trajopt.columns import Columns
 
-    context = info.context or {}
     name, column = value["csv"], value.get("column")
+    if "position" in value or "value" in value:
+        raise ValueError("give either csv, or position and value, not both")
     if not isinstance(name, str) or not isinstance(column, str | None):
         raise ValueError(f'csv and column must be texts such as csv = "inertia.csv", got {shown(name)}')
     table = Columns.read(Path(context.get("folder", ".")) / name, LONGEST_TABLE)

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from trajopt import problem as p
 from trajopt import units
+from trajopt.curve import written_out
 from trajopt.errors import BadInput
 from trajopt.fields import nearest
 
@@ -96,7 +97,7 @@ def from_dict(
     if "plant" in data:
         return _plant(data, name)
     if "axes" in data or "arm" in data:
-        return _axes(data, name)
+        return _axes(data, name, folder)
     written = data
     data = {key: _renamed(key, value, name) for key, value in data.items()}
     rotary = _rotary(data)
@@ -105,6 +106,27 @@ def from_dict(
         return p.Problem.model_validate({"rotary": rotary, **data}, context=context)
     except ValidationError as error:
         raise refused(name, _as_written(explain(error), written)) from None
+
+
+def carry_tables(data: dict[str, Any], name: str, folder: Path) -> dict[str, Any]:
+    """``data`` with the tables of its loads, which it names beside the file, written into it: for those who solve it
+    elsewhere. Raises BadInput."""
+    axes = data.get("axes")
+    if isinstance(axes, list):
+        data = data | {"axes": [carry_tables(x, name, folder) if isinstance(x, dict) else x for x in axes]}
+    load = data.get("load")
+    load = load if isinstance(load, dict) else {}
+    named = {key: value for key, value in load.items() if isinstance(value, dict) and "csv" in value}
+    if not named:
+        return data
+    renamed = {section: _renamed(section, value, name) for section, value in data.items()}
+    context = {"rotary": _rotary(renamed), "folder": folder}
+    for key, value in named.items():
+        try:
+            named[key] = written_out(value, _ALIASES["load"].get(key, key), context)
+        except ValueError as error:
+            raise refused(name, f"load.{key}: {error}") from None
+    return data | {"load": load | named}
 
 
 def _plant(data: dict[str, Any], name: str) -> PlantProblem:
@@ -119,7 +141,7 @@ def _plant(data: dict[str, Any], name: str) -> PlantProblem:
         raise refused(name, explain(error, PlantProblem)) from None
 
 
-def _axes(data: dict[str, Any], name: str) -> AxesProblem:
+def _axes(data: dict[str, Any], name: str, folder: Path | None) -> AxesProblem:
     """Several axes: each read as a problem of one is, and on an arm in angles unless it says otherwise."""
     from trajopt.axes.problem import AxesProblem
 
@@ -132,8 +154,9 @@ def _axes(data: dict[str, Any], name: str) -> AxesProblem:
     if isinstance(axes, list):
         arm = {"rotary": True} if "arm" in data else {}
         data = data | {"axes": [_axis({**arm, **x}, name) if isinstance(x, dict) else x for x in axes]}
+    context = {"rotary": False, "texts_only": True, "folder": folder or Path()}
     try:
-        return AxesProblem.model_validate(data, context={"rotary": False, "texts_only": True})
+        return AxesProblem.model_validate(data, context=context)
     except ValidationError as error:
         raise refused(name, _as_written(explain(error, AxesProblem), data)) from None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -80,19 +80,21 @@ class Case:
 
 @dataclass(frozen=True)
 class Plan:
-    """The cases of a study, in order. ``bases``: name -> content of a problem file."""
+    """The cases of a study, in order. ``bases``: name -> content of a problem file; ``folder``: of files that cases
+    name."""
 
     title: str
     bases: tuple[tuple[str, Mapping[str, Any]], ...]
     cases: tuple[Case, ...]
     plot: Plot | None = None
+    folder: Path = Path()
 
     def content(self, case: Case) -> dict[str, Any]:
         """What a problem file of this case would hold. Raises BadInput."""
         data: dict[str, Any] = copy.deepcopy(dict(self.bases[case.base][1]))
         for key, value in case.overrides:
             problem_file.assign(data, key, copy.deepcopy(value), f"{case.where}, {key}")
-        return data
+        return problem_file.carry_tables(data, case.where, self.folder)
 
     @property
     def solvable(self) -> list[Case]:
@@ -128,8 +130,8 @@ def from_dict(
     bases = tuple(_bases(file, name, folder))
     count = len(bases) * len(rows) * prod(len(values) for values in axes.values())
     _refuse_many(count, many, name)
-    plan = Plan(file.title, bases, tuple(_combined(len(bases), rows, axes)), file.plot)
-    return Plan(plan.title, bases, tuple(_checked(plan, name, keep_going)), plan.plot)
+    plan = Plan(file.title, bases, tuple(_combined(len(bases), rows, axes)), file.plot, folder)
+    return replace(plan, cases=tuple(_checked(plan, name, keep_going)))
 
 
 class TooMany(BadInput):
@@ -162,12 +164,14 @@ def _refuse_contradictions(file: _File, rows: Sequence[Row], name: str) -> None:
 
 def _bases(file: _File, name: str, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     if isinstance(file.problem, dict):
-        yield "", file.problem
+        yield "", problem_file.carry_tables(file.problem, name, folder)
         return
     ready = problem_file.ready_made()
     for text in (file.problem,) if file.problem is not None else file.problems:
         path = problem_file.find(Path(text), ready, "problem", folder)
-        yield Path(text).stem, problem_file.read_toml(problem_file.read_text(path), f"{name}: {text}")
+        where = f"{name}: {text}"
+        content = problem_file.read_toml(problem_file.read_text(path), where)
+        yield Path(text).stem, problem_file.carry_tables(content, where, path.parent)
 
 
 def _rows(file: _File, name: str, folder: Path) -> list[Row]:
