@@ -46,6 +46,14 @@ def test_an_impossible_axis_keeps_its_verdict() -> None:
     assert found[0].status.solved and not found[1].status.solved
 
 
+def test_an_axis_is_overridden_by_its_name_or_number() -> None:
+    problem = trajopt.load("gantry_together", ["axes.x.limits.velocity=1 m/s", "axes.1.move.end.position=0.2 m"])
+    first, second, _ = problem.axes
+    assert first.limits.velocity.highest == 1.0 and second.move.end.position == 0.2
+    with pytest.raises(trajopt.BadInput, match="axes has no z; one of x, y, turn"):
+        trajopt.load("gantry_together", ["axes.z.limits.velocity=1 m/s"])
+
+
 def test_the_command_prints_one_object_and_writes_a_folder_an_axis(tmp_path: Path) -> None:
     words = ["synchronise", "clemen_rupp_jerk_l2", "fly_past_via_state", "-o", str(tmp_path), "--json"]
     command = [sys.executable, "-c", f"from trajopt.cli import main; main({words!r})"]

@@ -75,7 +75,7 @@ def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float
     rows: list[dict[str, Any]] = []
     for name in dict.fromkeys([*found, *_names(problem)]):
         unit, own = found.get(name, (0.0, 0.0))
-        acts = bool(value) and abs(own) > 1e-7 * abs(value)
+        acts = bool(value) and abs(own) > 1e-6 * abs(value)
         relative = 0.0 if not acts else None if _is_zero(problem, name) else own / 100 / value
         row = {"name": name, "per_unit": unit if acts else 0.0, "unit": _unit(problem, name), "per_percent": relative}
         rows.append(row)

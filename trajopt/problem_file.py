@@ -280,12 +280,22 @@ def assign(data: dict[str, Any], key: str, value: Any, where: str) -> None:
         raise refused(where, f"write key=value, {_KEY_EXAMPLE}")
     section: Any = data
     for i, part in enumerate(parts[:-1]):
-        section = section.setdefault(part, {})
-        if not isinstance(section, dict):
+        among = section
+        section = _listed(section, part) if isinstance(section, list) else section.setdefault(part, {})
+        if section is None:
+            names = [x.get("name", k) if isinstance(x, dict) else k for k, x in enumerate(among)]
+            raise refused(where, f"{'.'.join(parts[:i])} has no {part}; one of {', '.join(map(str, names))}")
+        if not isinstance(section, dict) and not (isinstance(section, list) and i < len(parts) - 2):
             raise refused(where, f"{'.'.join(parts[: i + 1])} is not a section; set it as a whole")
     for other in _replaced(parts, value):
         section.pop(other, None)
     section[parts[-1]] = value
+
+
+def _listed(sections: list[Any], part: str) -> Any:
+    """The section of a list, such as [[axes]], that has this name or this number, counted from 0."""
+    named = [x for x in sections if isinstance(x, dict) and x.get("name") == part]
+    return named[0] if named else sections[int(part)] if part.isdecimal() and int(part) < len(sections) else None
 
 
 def _replaced(parts: list[str], value: Any) -> tuple[str, ...]:

@@ -66,17 +66,16 @@ def _table(solution: AxesSolution) -> Table:
     table.add_column("peak (limit)")
     for axis in solution.problem.axes:
         table.add_column(axis.name, justify="right")
-    table.add_column("unit")
+    mixed = len({axis.rotary for axis in solution.problem.axes}) > 1
+    table.add_column("" if mixed else "unit")
     for name in _ROWS:
-        cells, unit = [], ""
-        for axis in solution.problem.axes:
+        cells, kinds = [], [units.kinds(axis.rotary)[name] for axis in solution.problem.axes]
+        for axis, kind in zip(solution.problem.axes, kinds, strict=True):
             found, limit = solution.metrics.get(f"{axis.name}.peak_{name}"), axis.limits.given().get(name)
             most = "" if limit is None else f" ({max(abs(limit.lowest), abs(limit.highest)):g})"
-            cells.append("" if found is None else f"{found:.6g}{most}")
-            unit = units.kinds(axis.rotary)[name].unit
-        kind = units.kinds(solution.problem.axes[0].rotary)[name]
+            cells.append("" if found is None else f"{found:.6g}{most}{f' {kind.unit}' if mixed else ''}")
         if any(cells):
-            table.add_row(kind.name, *cells, unit)
+            table.add_row(kinds[0].name, *cells, "" if mixed else kinds[0].unit)
     energies = [solution.metrics.get(f"{axis.name}.energy") for axis in solution.problem.axes]
     if any(x is not None for x in energies):
         table.add_row("energy ∫|P|dt", *("" if x is None else f"{x:.6g}" for x in energies), "J")

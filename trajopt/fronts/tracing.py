@@ -59,7 +59,11 @@ def prepare(
 ) -> Any:
     """What makes a `Search`, from who is to solve and who hears of progress. Raises BadInput."""
     if not isinstance(problem, Problem):
-        raise BadInput("plant: the fastest command to a plant has one objective, its time; a front needs an axis")
+        if hasattr(problem, "plant"):
+            raise BadInput("plant: the fastest command to a plant has one objective, its time; a front needs an axis")
+        raise BadInput(
+            "axes: fronts are traced for one axis; for several, vary the weights of objective.terms by trajopt study"
+        )
     request = _request(points, error, method)
     terms = read(objectives, problem)
     if request.method == "epsilon" and len(terms) > 2:
