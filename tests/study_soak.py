@@ -18,8 +18,8 @@ from trajopt.study.run import Options, Report, run
 POISON: Final = ("crash", "leave", "eat", "hang")
 SMALL: Final[dict[str, Any]] = {
     "move": {"time": "1 s", "end": {"position": "100 mm"}},
-    "objective": {"minimize": "jerk", "norm": "l2"},
-    "transcription": {"intervals": 50},
+    "objective": {"minimize": "jerk", "norm": "linf"},
+    "transcription": {"intervals": 100},
 }
 
 

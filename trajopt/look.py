@@ -61,7 +61,7 @@ def dress(axes: Axes) -> None:
 
 def title(axes: Axes, text: str, pad: float = 6) -> None:
     """A bold title at the left, wrapped."""
-    wrapped = "\n".join(textwrap.wrap(text, 70))
+    wrapped = "\n".join(textwrap.wrap(text, 64))
     axes.set_title(wrapped, loc="left", fontsize=11, fontweight="bold", pad=pad)
 
 
