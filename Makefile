@@ -49,7 +49,7 @@ UV = .setup/uv/bin/uv
 lock: $(UV)
 	@mkdir -p .setup
 	cp requirements.lock .setup/new.lock
-	$(UV) pip compile pyproject.toml --extra build --extra test --extra cluster --extra bench --universal --python-version 3.11 \
+	$(UV) pip compile pyproject.toml --extra build --extra test --extra cluster --extra notebooks --extra docs --extra bench --universal --python-version 3.11 \
 	    --generate-hashes --no-header --no-annotate --quiet $(LOCKFLAGS) --output-file .setup/new.lock
 	@! grep -nE '://|^-' .setup/new.lock || { echo 'lock: it names a host or an option, not kept' >&2; exit 1; }
 	mv .setup/new.lock requirements.lock

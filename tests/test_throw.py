@@ -19,7 +19,7 @@ from scara import TwoLinkArm, figures
 from tests.bad_arms import GANTRY, THROW
 from tests.conftest import PUBLISHED_CURVES
 from tests.reference.clemen_rupp_scara import PublishedArm
-from trajopt import problem_file, transcribe
+from trajopt import cli, problem_file, transcribe
 from trajopt.attempt import Clock
 from trajopt.axes.attempt import on_mesh, run
 from trajopt.axes.explain import forward_only_speed, limits_bound
@@ -165,10 +165,22 @@ def test_files_figures_and_pickles(throw: trajopt.AxesSolution, tmp_path: Path) 
     assert again.objective == throw.objective and again.metrics == throw.metrics
     for axes in (figures.poses(throw), figures.joints(throw)[0], figures.tips(throw)[0]):
         assert axes.figure.get_axes()
-    film = figures.animate(throw, tmp_path / "throw.gif", frames=8)
+    film = throw.animate(tmp_path / "throw.gif", frames=8)
     assert film.read_bytes()[:6] == b"GIF89a"
     with pytest.raises(ValueError, match="within 0 to 1 s"):
         throw.at(1.1)
+
+
+def test_the_command_animates_arms_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    coarse = ["--set", "search.starts=1", "--set", "search.intervals=8", "--set", "transcription.intervals=8"]
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["solve", "scara_throw", *coarse, "--animate", "-o", str(tmp_path)])
+    assert ended.value.code == 0 and (tmp_path / "motion.gif").read_bytes()[:6] == b"GIF89a"
+    for words in (["scara_throw"], ["gantry_together", "-o", str(tmp_path / "new")]):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["solve", *words, "--animate"])
+        assert ended.value.code == 2 and "--animate: " in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
 
 
 def test_fifty_seeds_of_the_sampler_on_a_coarse_mesh() -> None:

@@ -16,7 +16,7 @@ from trajopt.verdict import Verdict
 
 _STALE: Final = (  # files of another answer in the same folder
     "trajectory.csv", "trajectory.png", "prices.png", "vibration.png", "arcs.png", "command.csv", "command.png",
-    "motion.png", "poses.png", "tip.png",
+    "motion.png", "motion.gif", "poses.png", "tip.png",
 )  # fmt: skip
 
 

@@ -9,13 +9,16 @@ import sys
 import tempfile
 import traceback
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 from typer.exceptions import TyperException
 
 from trajopt.errors import BadInput, InternalError, TrajoptError
 from trajopt.verdict import Verdict
+
+if TYPE_CHECKING:
+    from trajopt.axes.solution import AxesSolution
 
 app = typer.Typer(
     add_completion=False,
@@ -41,6 +44,7 @@ def solve(
     seconds: Annotated[float | None, typer.Option("--seconds", help="wall-time limit, s")] = None,
     tighten: Annotated[bool, typer.Option("--tighten", help="tighten the bound on power and energy")] = False,
     timings: Annotated[bool, typer.Option("--timings", help="say where the time went")] = False,
+    animate: Annotated[bool, typer.Option("--animate", help="write the arm in motion as well, motion.gif")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem; exits 0 only with a checked answer."""
@@ -49,11 +53,16 @@ def solve(
 
     _refuse_seconds(seconds)
     problem = problem_file.load(source, [*overrides, *(["transcription.tighten=true"] if tighten else [])])
+    if animate and (output is None or getattr(problem, "arm", None) is None):
+        need = "needs a folder to write into; give --output" if output is None else "this problem has no arm to draw"
+        raise BadInput(f"--animate: {need}")
     _make_folder(output)
     for warning in preflight.warnings(problem):
         print(f"warning: {warning}", file=sys.stderr)
     solution = solve_apart(problem, seconds)
     written = solution.save(output) if output is not None else []
+    if animate and solution.status.solved:
+        written.append(cast("AxesSolution", solution).animate(cast(Path, output) / "motion.gif"))
     if as_json:
         compared = solution.comparison() if solution.status.solved else []
         print(json.dumps(solution.sealed(comparison=compared), allow_nan=False))

@@ -19,10 +19,14 @@ class NoSolution(TrajoptError):
     """Numbers were asked of a solution that has none (impossible, undecided, limit)."""
 
 
-class MissingSolver(TrajoptError):
-    """A solver is not installed; the message names the package that brings it."""
+class MissingPackage(TrajoptError):
+    """Something that is asked for needs a package that is not installed; the message names it."""
 
     exit_code = 4
+
+
+class MissingSolver(MissingPackage):
+    """A solver is not installed; the message names the package that brings it."""
 
 
 class InternalError(TrajoptError):

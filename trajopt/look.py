@@ -13,6 +13,7 @@ from typing import Any, Final, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe-Ito
 STYLES: Final[tuple[Any, ...]] = (
@@ -43,7 +44,7 @@ class Panels(list[Axes]):
 
 def panels(count: int, height: float, *, share: bool = False) -> Panels:
     """``count`` dressed axes under each other in a new figure of a ``height`` in inches, with one time axis or not."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.08), facecolor="white")
     made = Panels(figure.subplots(count, 1, sharex=share, squeeze=False)[:, 0])
     for axes in made:
         dress(axes)

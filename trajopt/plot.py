@@ -43,7 +43,7 @@ def plot(solution: Solution) -> Panels:
     from trajopt.report import objective_text
 
     trajectory = _moved(solution)
-    names = _names(trajectory)
+    names = signal_names(trajectory)
     panels = _panels(names, trajectory)
     for axes, name in zip(panels, names, strict=True):
         time, values = curve(trajectory, name)
@@ -133,7 +133,7 @@ def compare(
     solid = {label: _moved(solution) for label, solution in given.items()}
     second = {label: _moved(solution) for label, solution in (dashed or {}).items()}
     shown = [*solid.values(), *second.values()]
-    present = {name for trajectory in shown for name in _names(trajectory)}
+    present = {name for trajectory in shown for name in signal_names(trajectory)}
     names: list[str] = [name for name in (*DERIVATIVES, "force", "power", *_ELECTRICAL) if name in present]
     panels = _panels(names, shown[0])
     styles = ["solid"] if second else STYLES
@@ -141,7 +141,7 @@ def compare(
         for group, drawn in ((solid, styles), (second, [(0, (3, 1.2))])):
             looks = zip(cycle(COLOURS), cycle(drawn), _widths(len(group)), group.items(), strict=False)
             for colour, style, width, (label, trajectory) in looks:
-                if name in _names(trajectory):
+                if name in signal_names(trajectory):
                     axes.plot(*curve(trajectory, name), color=colour, linestyle=style, linewidth=width, label=label)
         _finish(axes, name, shown)
     _legend(panels, len(solid), len(second))
@@ -205,7 +205,7 @@ def _moved(solution: Solution) -> Trajectory:
     return solution.trajectory
 
 
-def _names(trajectory: Trajectory) -> list[str]:
+def signal_names(trajectory: Trajectory) -> list[str]:
     """The panels that a trajectory fills, top first."""
     problem = trajectory.problem
     names: list[str] = [*DERIVATIVES[: trajectory.order + 1]]
@@ -248,7 +248,7 @@ def _finish(axes: Axes, name: str, trajectories: list[Trajectory]) -> None:
     far: list[float] = []
     for trajectory in trajectories:
         _mark_via(axes, name, trajectory)
-        for time, values in _limit_lines(trajectory, name):
+        for time, values in limit_lines(trajectory, name):
             if (key := time.tobytes() + values.tobytes()) in drawn:
                 continue
             drawn[key] = None
@@ -278,7 +278,7 @@ def _reach(axes: Axes) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _limit_lines(trajectory: Trajectory, name: str) -> list[tuple[Floats, Floats]]:
+def limit_lines(trajectory: Trajectory, name: str) -> list[tuple[Floats, Floats]]:
     """(time, value) of the lower and the upper limit, with every corner."""
     limit: Limit | None = trajectory.problem.limits.given().get(name)
     corners = () if limit is None else limit.breakpoints

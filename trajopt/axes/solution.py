@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from trajopt.answer import Answer
@@ -57,6 +58,12 @@ class AxesSolution(Answer):
         from trajopt.axes.plot import plot
 
         return plot(self)
+
+    def animate(self, path: str | Path, frames: int = 60, slower: float = 3.0) -> Path:
+        """Write the arm in motion as a GIF, ``slower`` than it is; returns the path. Raises NoSolution, OSError, BadInput
+        without an arm of links."""
+        found: Path = known_pictures().animate(self, path, frames, slower)
+        return found
 
     def comparison(self) -> list[dict[str, Any]]:
         """Empty: no profile of a drive is meant for several axes at once. Raises NoSolution."""

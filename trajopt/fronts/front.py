@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from trajopt.fronts.explore import Explorer
+
 
 @dataclass(frozen=True)
 class Point:
@@ -154,6 +156,14 @@ class Front:
         from trajopt.plot_front import plot_front
 
         return plot_front(self)
+
+    def explore(self) -> Explorer:
+        """A page on which a slider or a click shows each point's move, prices and limits; a notebook shows it,
+        ``.save("front.html")`` writes it. Raises ValueError for a front without points, MissingPackage without plotly.
+        """
+        from trajopt.fronts.explore import explore
+
+        return explore(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of front.json, without its seal."""

@@ -210,7 +210,8 @@ def _serve(asked: Connection, function: str, limits: Limits) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     module, _, name = function.partition(":")
     solve = getattr(importlib.import_module(module), name)
-    asked.send_bytes(b"ready")
+    with suppress(ConnectionError):  # the parent has died: to be found out when it asks nothing
+        asked.send_bytes(b"ready")
     while True:
         try:
             question = asked.recv_bytes().decode()
