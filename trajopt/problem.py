@@ -293,7 +293,7 @@ class Term(Section):
     """One objective term: ``weight`` times a norm of a signal over the move, or energy ∫|P|dt, copper loss or
     electrical energy (J, see `trajopt.motor`), or time (s)."""
 
-    minimize: str
+    minimize: Annotated[str, BeforeValidator(lambda name: "force" if name == "torque" else name)]
     norm: NamedNorm = None
     weight: Annotated[float, BeforeValidator(_weight)] = 1.0
 

@@ -60,8 +60,10 @@ class AxesSolution(Answer):
         return plot(self)
 
     def animate(self, path: str | Path, frames: int = 60, slower: float = 3.0) -> Path:
-        """Write the arm in motion as a GIF, ``slower`` than it is; returns the path. Raises NoSolution, OSError, BadInput
-        without an arm of links."""
+        """Write the arm in motion as a GIF, ``slower`` than it is; returns the path.
+
+        Raises NoSolution, OSError, and BadInput without an arm of links.
+        """
         found: Path = known_pictures().animate(self, path, frames, slower)
         return found
 

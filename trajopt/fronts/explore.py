@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from trajopt.trajectory import Trajectory
 
 _SAMPLES: Final = 400  # of a curve
-_HEIGHT: Final = 760  # pixels
+_HEIGHT: Final = 860  # pixels
 _IN_VIEW: Final = 1.5  # times the largest value of any point: limits beyond are not drawn
 _CURRENT: Final = 1  # trace of the marker of the point that is shown; those of the move follow
 _CLICK: Final = """
@@ -89,11 +89,11 @@ def _figure(front: Front) -> Figure:
     figure.update_xaxes(title="time [s]", row=rows, col=2)
     steps = [_step(front, k, [_sampled(moves[k], name) for name in names]) for k in range(len(moves))]
     slider = {"active": first, "steps": steps, "len": 0.38, "pad": {"t": 50}, "currentvalue": {"prefix": "point "}}
-    words = {"text": _words(front, first), "xref": "paper", "yref": "paper", "x": 0.36, "y": 1.0, "xanchor": "right",
-             "yanchor": "top", "showarrow": False, "align": "left", "font": {"size": 12}}  # fmt: skip
+    words = {"text": _words(front, first), "xref": "paper", "yref": "paper", "x": 0.0, "y": 1.01, "xanchor": "left",
+             "yanchor": "bottom", "showarrow": False, "align": "left", "font": {"size": 12}}  # fmt: skip
     figure.update_layout(
-        title={"text": front.problem.title or "Pareto front"}, sliders=[slider], annotations=[words], showlegend=False,
-        template="simple_white", height=_HEIGHT, margin={"t": 60, "b": 90, "r": 20},
+        title={"text": front.problem.title or "Pareto front", "y": 0.98}, sliders=[slider], annotations=[words], showlegend=False,
+        template="simple_white", height=_HEIGHT, margin={"t": 170, "b": 90, "r": 20},
     )  # fmt: skip
     return figure
 
