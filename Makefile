@@ -1,4 +1,4 @@
-.PHONY: help setup demo test lint soak bench lock clean
+.PHONY: help setup browser demo test lint lab docs soak bench lock clean
 
 export LC_ALL := C.UTF-8
 export TZ := UTC
@@ -12,6 +12,8 @@ help:
 	@echo 'make demo    set up if needed, then solve the demonstration problem into demo/'
 	@echo 'make test    set up if needed, then run the tests, ruff and mypy'
 	@echo 'make lint    ruff and mypy alone'
+	@echo 'make lab     the notebooks in JupyterLab, on loopback'
+	@echo 'make docs    the documentation as a site, in build/docs/html'
 	@echo 'make soak    the long random test'
 	@echo 'make bench   times against peers, in one run'
 	@echo 'make lock    renew requirements.lock from pyproject.toml (LOCKFLAGS=--upgrade takes newer releases)'
@@ -24,13 +26,22 @@ setup:
 demo: setup
 	$(python) -m problems.clemen_rupp --output demo
 
-test: setup
+browser:
+	@bash tools/setup.sh browser
+
+test: setup browser
 	$(python) -m pytest --numprocesses 2 --dist worksteal
 	@$(MAKE) --no-print-directory lint
 
 lint: setup
 	$(python) -m ruff check
 	$(python) -m mypy trajopt norms scara problems bench
+
+lab: setup
+	$(python) -m jupyterlab --ip=127.0.0.1 notebooks
+
+docs: setup
+	$(python) -m docs.build
 
 bench: setup
 	$(python) -m bench.run --output build/bench

@@ -52,7 +52,7 @@ class Explorer:
     def _repr_html_(self) -> str:
         """In a frame of its own, so that no other script of the page meddles."""
         source = html.escape(self.page, quote=True)
-        return f'<iframe srcdoc="{source}" style="width:100%;height:{_HEIGHT + 40}px;border:0"></iframe>'
+        return f'<iframe srcdoc="{source}" scrolling="no" style="width:100%;height:{_HEIGHT + 40}px;border:0"></iframe>'
 
 
 def explore(front: Front) -> Explorer:
@@ -92,8 +92,8 @@ def _figure(front: Front) -> Figure:
     words = {"text": _words(front, first), "xref": "paper", "yref": "paper", "x": 0.0, "y": 1.01, "xanchor": "left",
              "yanchor": "bottom", "showarrow": False, "align": "left", "font": {"size": 12}}  # fmt: skip
     figure.update_layout(
-        title={"text": front.problem.title or "Pareto front", "y": 0.98}, sliders=[slider], annotations=[words], showlegend=False,
-        template="simple_white", height=_HEIGHT, margin={"t": 170, "b": 90, "r": 20},
+        title={"text": front.problem.title or "Pareto front", "y": 0.98}, sliders=[slider], annotations=[words],
+        showlegend=False, template="simple_white", height=_HEIGHT, margin={"t": 170, "b": 90, "r": 20},
     )  # fmt: skip
     return figure
 
