@@ -67,7 +67,15 @@ def _state(browser: webdriver.Chrome) -> dict[str, Any]:
     state: dict[str, Any] = browser.execute_script("""
         const page = document.querySelector('.plotly-graph-div');
         return {words: document.querySelector('.annotation-text').textContent, x: page._fullData[1].x[0],
-                velocity: Array.from(page._fullData[3].y), slider: page.layout.sliders[0].active};""")
+                velocity: Array.from(page._fullData[3].y), slider: page.layout.sliders[0].active,
+                curves: page._fullData.slice(1).map(x => [x.name, Math.min(...x.y), Math.max(...x.y)])};""")
+    peaks = {name: max(-low, high) for name, low, high in state["curves"][1:6]}
+    assert peaks["velocity"] <= 0.5 and 1.0 < peaks["acceleration"] <= 4.905 and peaks["jerk"] == pytest.approx(98.1)
+    assert peaks["power"] == pytest.approx(
+        float(state["words"].partition("peak power ")[2].partition(" W")[0]), rel=2e-2
+    )
+    limits = {name: peak for name, _, peak in state["curves"][6:]}
+    assert set(limits) == {"limit"}, "a curve took the place of a limit"
     return state
 
 

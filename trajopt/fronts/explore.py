@@ -85,6 +85,7 @@ def _figure(front: Front) -> Figure:
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=kinds[name].name, row=k + 1, col=2)
         label = f"{kinds[name].name}<br>[{pretty(kinds[name].unit)}]"
         figure.update_yaxes(title={"text": label, "font": {"size": 11}}, row=k + 1, col=2)
+    for k, name in enumerate(names):
         _draw_limits(figure, moves, name, k + 1)
     figure.update_xaxes(title="time [s]", row=rows, col=2)
     steps = [_step(front, k, [_sampled(moves[k], name) for name in names]) for k in range(len(moves))]
