@@ -38,7 +38,7 @@ lint: setup
 	$(python) -m mypy trajopt norms scara problems bench
 
 lab: setup
-	$(python) -m jupyterlab --ip=127.0.0.1 notebooks
+	$(python) -m jupyterlab --ip=127.0.0.1 $(if $(filter 0,$(shell id -u)),--allow-root) notebooks
 
 docs: setup
 	$(python) -m docs.build

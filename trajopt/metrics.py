@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import comb
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -97,12 +97,11 @@ def peak(signal: Signal) -> float:
         return float(np.max(np.abs(signal.nodes)))
     pieces = np.stack(np.broadcast_arrays(*signal.pieces))
     best = float(np.max(np.abs(pieces[[0, -1]])))
-    doubtful = np.flatnonzero(np.max(np.abs(pieces), axis=0) > best)  # a polynomial lies within its coefficients
-    for k in doubtful:
-        power = _power_form(pieces[:, k])
-        inside = _roots_inside(polynomial.polyder(power))
-        best = max([best, *np.abs(polynomial.polyval(inside, power))])
-    return float(best)
+    doubtful = pieces[:, np.max(np.abs(pieces), axis=0) > best]  # a polynomial lies within its coefficients
+    power = _power_form(doubtful)
+    slope: Floats = np.asarray(polynomial.polyder(power))
+    inside = polynomial.polyval(_roots_inside(slope), power[:, None], tensor=False)
+    return float(np.max(np.abs(inside), initial=best))
 
 
 def rms(trajectory: Trajectory, signal: Signal) -> float:
@@ -121,10 +120,11 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
     pieces = np.stack(np.broadcast_arrays(*signal.pieces))
     total = np.abs(_integrals(trajectory, signal))
     steps = np.diff(trajectory.time)
-    for k in np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0)):
-        power = polynomial.polyint(_power_form(pieces[:, k]))
-        ends = np.concatenate([[0.0], np.sort(_roots_inside(polynomial.polyder(power))), [1.0]])
-        total[k] = steps[k] * np.abs(np.diff(polynomial.polyval(ends, power))).sum()
+    mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
+    power = _power_form(pieces[:, mixed])
+    ends = np.concatenate([np.zeros((1, len(mixed))), _roots_inside(power), np.ones((1, len(mixed)))])
+    risen = polynomial.polyval(ends, polynomial.polyint(power)[:, None], tensor=False)
+    total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
     return float(np.sum(total))
 
 
@@ -132,11 +132,9 @@ def _reversals(trajectory: Trajectory, name: str) -> Floats:
     """The times at which a signal changes its sign between nodes, s."""
     pieces = np.stack(np.broadcast_arrays(*trajectory.signal(name).pieces))
     time = trajectory.time
-    found = [
-        time[k] + _roots_inside(_power_form(pieces[:, k])) * (time[k + 1] - time[k])
-        for k in np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
-    ]
-    return np.concatenate([np.empty(0), *found])
+    mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
+    places = _roots_inside(_power_form(pieces[:, mixed]))
+    return np.sort((time[mixed] + places * (time[mixed + 1] - time[mixed]))[places < 1])
 
 
 def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
@@ -147,19 +145,26 @@ def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
 
 
 def _power_form(bernstein: Floats) -> Floats:
-    """Power coefficients, lowest first, from Bernstein coefficients on [0, 1]."""
+    """(n+1, m) power coefficients, lowest first, of m polynomials from their Bernstein coefficients on [0, 1]."""
     n = len(bernstein) - 1
-    power = np.zeros(n + 1)
-    for i, b in enumerate(bernstein):
-        for j in range(i, n + 1):
-            power[j] += (-1.0) ** (j - i) * comb(n, j) * comb(j, i) * b
+    basis = [[(-1.0) ** (j - i) * comb(n, j) * comb(j, i) if i <= j else 0.0 for i in range(n + 1)]
+             for j in range(n + 1)]  # fmt: skip
+    power: Floats = np.array(basis) @ bernstein
     return power
 
 
-def _roots_inside(power: Any) -> Floats:
-    size = np.max(np.abs(power), initial=0.0)
-    if size == 0.0:
-        return np.empty(0)
-    roots = polynomial.polyroots(polynomial.polytrim(power, 1e-14 * size))
-    real = roots[np.abs(roots.imag) < 1e-9].real if len(roots) else roots.real
-    return real[(real > 0) & (real < 1)]
+def _roots_inside(power: Floats) -> Floats:
+    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted, as eigenvalues of their companions; 1 where
+    there are fewer."""
+    found = np.ones((len(power) - 1, power.shape[1]))
+    counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
+    degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
+    for n in range(1, len(power)):
+        columns = np.flatnonzero(degree == n)
+        companion = np.zeros((len(columns), n, n))
+        companion[:, 1:, :-1] = np.eye(n - 1)
+        companion[:, :, -1] = -(power[:n, columns] / power[n, columns]).T
+        roots = np.linalg.eigvals(companion)
+        inside = (np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)
+        found[:n, columns] = np.sort(np.where(inside, roots.real, 1.0), axis=1).T
+    return found
