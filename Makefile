@@ -45,7 +45,6 @@ docs: setup
 
 bench: setup
 	$(python) -m bench.run --output build/bench
-	$(python) -m bench.study --output build/bench
 
 soak: setup
 	$(python) -m tests.soak

@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 
 import trajopt
-from bench import processes
+from bench import processes, study
 from bench.cases import CASES, DISTANCE, LEAST_TIMES, Case
-from bench.peers import bare_clarabel, casadi_opti, pyomo_ipopt, rockit_ocp, ruckig_profile
+from bench.peers import bare_clarabel, casadi_mechanics, casadi_opti, pyomo_ipopt, rockit_ocp, ruckig_profile
 
 AGREE: Final = 1e-5  # relative: optima further apart void a comparison
 
@@ -59,15 +59,18 @@ FULL: Final = Plan(200, 5000, (1000, 5000, 20_000, 100_000), 9, 1)
 SMOKE: Final = Plan(20, 24, (20, 40), 1, 1)
 
 
-def compared(row: Row, ours: Callable[[], float], theirs: Callable[[], float], runs: int, agree: float = AGREE) -> Row:
-    """Both in turn, after a first run of each that must agree: else the comparison is void, and says so."""
+def compared(
+    row: Row, ours: Callable[[], float], theirs: Callable[[], float], runs: int, agree: float = AGREE, parts: int = 1
+) -> Row:
+    """Both in turn, after a first run of each that must agree: else the comparison is void, and says so. Ours does what
+    theirs does ``parts`` times."""
     try:
         here, there = ours(), theirs()
+        if abs(here - there) > agree * abs(there):
+            return replace(row, note=f"void: {here!r} against {there!r}")
+        times = np.array([[_timed(ours) / parts, _timed(theirs)] for _ in range(runs)])
     except (RuntimeError, ValueError) as error:
         return replace(row, note=f"void: {str(error).strip().splitlines()[-1][:90]}")
-    if abs(here - there) > agree * abs(there):
-        return replace(row, note=f"void: {here!r} against {there!r}")
-    times = np.array([[_timed(ours), _timed(theirs)] for _ in range(runs)])
     ratios = (times[:, 0] / times[:, 1]).tolist()
     low, _, high = quantiles(ratios, n=4) if runs > 1 else ratios * 3
     return replace(
@@ -157,6 +160,52 @@ def others(plan: Plan) -> Iterator[Row]:
     yield compared(row, lambda: ours(mixture), lambda: pyomo_ipopt.mixture(0.5, 0.5, n), runs)
 
 
+def front(plan: Plan) -> Iterator[Row]:
+    """Fig. 7 of Clemen & Rupp: a front of 51 weights, by us in one sweep, the paper's way by a model for each."""
+    n, count = plan.small, 51 if plan is FULL else 3
+    problem = CASES["energy"].problem(n)
+    weights = np.arange(1, count - 1) / (count - 1)
+
+    def sweep() -> float:
+        found = trajopt.pareto(problem, "energy,peak_power", points=count)
+        if found.status is not trajopt.Verdict.SOLVED:
+            raise ValueError(f"ours: {found.status.value}: {found.message}")
+        return float(len(found.points) > 1)
+
+    def by_hand() -> float:
+        for w in (1e-3, *weights, 1 - 1e-3):
+            pyomo_ipopt.mixture(float(w), float(1 - w), n)
+        return 1.0
+
+    row = Row("front", f"energy and peak power, {count} points", n, "Pyomo, Ipopt, a model a weight")
+    yield compared(row, sweep, by_hand, 1)
+
+
+def mechanics(plan: Plan) -> Iterator[Row]:
+    """What is nonlinear by itself: a throw (a start of ten, ours with the coarse mesh, the choice and the checks), a
+    crank (ours from three starts) and a servomotor (ours with its optimum in continuous time)."""
+    n, starts = plan.small, 10 if plan is FULL else 1
+    runs = max(plan.runs // 3, 1)
+    throw = trajopt.load("scara_throw", [f"transcription.intervals={n}", f"search.starts={starts}"])
+    row = Row("mechanics", "SCARA throw, a start", n, "CasADi Opti, Ipopt")
+    yield compared(row, partial(ours, throw), partial(casadi_mechanics.throw, throw), runs, parts=starts)
+    crank = trajopt.load("slider_crank", [f"transcription.intervals={n}"])
+    row = Row("mechanics", "crank, RMS torque", n, "CasADi Opti, Ipopt")
+    yield compared(row, partial(ours, crank), partial(casadi_mechanics.crank, n), runs)
+    motor = trajopt.load("servomotor_case_2", [f"transcription.intervals={n}"])
+    row = Row("mechanics", "servomotor, electrical energy", n, "CasADi Opti, Ipopt")
+    yield compared(row, partial(ours, motor), partial(casadi_mechanics.servomotor, motor, n), runs)
+
+
+def studies(plan: Plan) -> Iterator[Row]:
+    """What a study costs over the bare solves of its cases, and what a second worker saves."""
+    found = study.measured(1000 if plan is FULL else 4)
+    ours_ms, bare_ms = 1e3 * found["workers_1"], 1e3 * found["bare"]
+    note = f"two workers: {found['speed_up']:.2f} times as fast"
+    yield Row("studies", f"{found['cases']} small cases, one worker", 40, "the bare solves", ours_ms, bare_ms,
+              ours_ms / bare_ms, ours_ms / bare_ms, ours_ms / bare_ms, 1, note)  # fmt: skip
+
+
 def least_time(plan: Plan) -> Iterator[Row]:
     """Minimum time of chains, against Ruckig where it knows them, and of the two-mass plant."""
     for name, problem in LEAST_TIMES.items():
@@ -207,6 +256,9 @@ GROUPS: Final[dict[str, Callable[[Plan], Iterator[Row]]]] = {
     "convex": convex,
     "power": power,
     "others": others,
+    "front": front,
+    "mechanics": mechanics,
+    "studies": studies,
     "least-time": least_time,
     "growth": growth,
     "start-up": start_up,

@@ -1,12 +1,7 @@
-"""What a study costs over the bare solves, and what a second worker saves, in one run.
-
-python -m bench.study                      a Markdown table, and study.json in the folder given by --output
-"""
+"""What a study costs over the bare solves, and what a second worker saves."""
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 from pathlib import Path
 from time import perf_counter
@@ -67,29 +62,3 @@ def measured(count: int) -> dict[str, Any]:
     for k in (1, 2):
         row[f"workers_{k}"], row[f"solving_{k}"] = by_study(stated, k)
     return row | {"overhead": row["workers_1"] / row["bare"] - 1, "speed_up": row["workers_1"] / row["workers_2"]}
-
-
-def table(row: dict[str, Any]) -> str:
-    """Markdown."""
-    headings = ("small cases", "bare [s]", "1 worker [s]", "overhead", "2 workers [s]", "solving", "speed-up")
-    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
-    one = f"{row['bare']:.1f} | {row['workers_1']:.1f} | {100 * row['overhead']:.0f} %"
-    two = f"{row['workers_2']:.1f} | {100 * row['solving_2']:.0f} % | {row['speed_up']:.2f}"
-    return "\n".join([*lines, f"| {row['cases']} | {one} | {two} |"])
-
-
-def main() -> None:
-    """Print the table, write the JSON."""
-    parser = argparse.ArgumentParser(prog="python -m bench.study", description=__doc__)
-    parser.add_argument("--cases", type=int, default=400, help="how many (400)")
-    parser.add_argument("--output", type=Path, help="a folder for study.json")
-    options = parser.parse_args()
-    row = measured(options.cases)
-    print(table(row))
-    if options.output is not None:
-        options.output.mkdir(parents=True, exist_ok=True)
-        (options.output / "study.json").write_text(json.dumps(row, indent=1))
-
-
-if __name__ == "__main__":
-    main()
