@@ -114,7 +114,7 @@ def figures(solutions: Mapping[Case, Solution], directory: Path) -> list[Path]:
 
     A figure that lacks a solution is left out. Raises OSError.
     """
-    from trajopt.plot import compare, plot
+    from trajopt.plots.trajectories import compare, plot
 
     euler = {name: solution for (name, scheme), solution in solutions.items() if scheme == "euler"}
     paths = []

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from scara.links import Links
-from trajopt import look
 from trajopt.axes.plot import profiles
 from trajopt.errors import BadInput
-from trajopt.look import COLOURS, GREY, SMALL, Panels, dress
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, GREY, SMALL, Panels, dress
 
 if TYPE_CHECKING:
     from trajopt.axes.motion import Motion

@@ -312,7 +312,7 @@ def _objective() -> Iterator[Bad]:
         ("no-norm", '{minimize="power"}', ("norm: is missing", "l1, l2, linf")),
         ("weight", '{minimize="energy", weight=0}', ("weight: must be > 0",)),
         ("key", '{minimize="energy", wieght=1}', ("wieght: unknown key", "did you mean 'weight'")),
-        ("quantity", '{minimize="torque", norm="l2"}', ("minimize: unknown 'torque'", "force")),
+        ("quantity", '{minimize="torqe", norm="l2"}', ("minimize: unknown 'torqe'",)),
     )
     for name, term, (first, *rest) in terms:
         where = "objective.terms[1]."

@@ -18,9 +18,9 @@ from problems import slider_crank
 from tests.test_cli import run
 from tests.test_mechanism import crank
 from trajopt import checker
-from trajopt.chebyshev import Family, bound, search, search_box
-from trajopt.laws import Laid, trapezoid
 from trajopt.profiles import Profiles, compare_profiles
+from trajopt.profiles.chebyshev import Family, bound, search, search_box
+from trajopt.profiles.laws import Laid, trapezoid
 
 ROWS = {  # N m RMS, of the reference
     ("poly5", 5, "JF"): 20.633836, ("cheb7", 7, "JF"): 11.270833, ("cheb9", 9, "JF"): 10.017414,

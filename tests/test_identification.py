@@ -12,7 +12,7 @@ import trajopt
 from problems import slider_crank
 from tests.test_cli import run
 from trajopt.identification import friction_of, identify, joint, pointwise
-from trajopt.motions import Motion
+from trajopt.identification.motions import Motion
 
 STROKE = np.deg2rad(175.0)
 AT = np.linspace(*np.deg2rad([1.0, 174.0]), 300)

@@ -22,9 +22,9 @@ from trajopt.fronts import geometry
 from trajopt.fronts.blends import blend
 from trajopt.fronts.geometry import Outside
 from trajopt.fronts.output import FORMAT
+from trajopt.fronts.plot import plot_front
 from trajopt.fronts.scalarise import Answer, Plane
 from trajopt.fronts.tracing import prepare
-from trajopt.plot_front import plot_front
 from trajopt.workers import Here
 
 EXACT_FRONT = {.83: 5.307679, .91: 2.984933, 1.15: 1.903022, 1.55: 1.683335}  # J: W, computed independently

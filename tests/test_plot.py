@@ -18,8 +18,8 @@ from matplotlib.lines import Line2D
 
 import trajopt
 from tests.conftest import axis, solved, table_i
-from trajopt.plot import COLOURS, SHADE, Panels, compare, curve, plot
-from trajopt.redraw import redraw
+from trajopt.plots.redraw import redraw
+from trajopt.plots.trajectories import COLOURS, SHADE, Panels, compare, curve, plot
 
 QUICK: dict[str, Any] = {"intervals": 40}
 
@@ -233,7 +233,10 @@ def test_without_a_solution_there_is_no_figure(smooth: trajopt.Solution) -> None
 
 
 def test_pyplot_and_its_global_figures_stay_out() -> None:
-    code = "import sys, trajopt.plot; print('matplotlib.figure' in sys.modules, 'matplotlib.pyplot' in sys.modules)"
+    code = (
+        "import sys, trajopt.plots.trajectories;"
+        " print('matplotlib.figure' in sys.modules, 'matplotlib.pyplot' in sys.modules)"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["True", "False"]
 

@@ -23,7 +23,7 @@ _HOMES = {
     "check_file": "trajopt.checker",
     "Solution": "trajopt.solution",
     "read_result": "trajopt.stored",
-    "compare": "trajopt.plot",
+    "compare": "trajopt.plots.trajectories",
     "Verdict": "trajopt.verdict",
     **dict.fromkeys(
         (

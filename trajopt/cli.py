@@ -310,7 +310,7 @@ def plot(
     labels: Annotated[list[str], typer.Option("--label", help="a name for each, in a comparison")] = [],  # noqa: B006
 ) -> None:
     """Draw written results again: one, or several in comparison."""
-    from trajopt.redraw import redraw
+    from trajopt.plots.redraw import redraw
 
     redraw(results, output, kind, labels)
     print(f"wrote {output}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
+import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,24 @@ class Section(BaseModel):
 
     # Else pydantic takes it for one that validation must go through, and loses the context (units) on the way.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+
+class Whole(Section):
+    """A problem: sections that can be replaced, and the data and hash that it is known by."""
+
+    def replace(self, **sections: Any) -> Self:
+        """A copy with sections replaced, validated again."""
+        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical form: two problems with the same one are the same problem."""
+        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def canonical(self) -> dict[str, Any]:
+        """Plain SI data that says everything about the problem, for result files and hashes."""
+        return self.model_dump(mode="json", exclude_none=True)
 
 
 def si(value: Any, kind: str, info: ValidationInfo, rotary: bool | None = None) -> float:

@@ -6,8 +6,6 @@ in files they are texts with a unit (see `trajopt.units` and `trajopt.problem_fi
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
@@ -22,6 +20,7 @@ from trajopt.fields import (
     Limit,
     Section,
     Table,
+    Whole,
     nearest,
     nonnegative,
     plain,
@@ -460,7 +459,7 @@ def _within(limit: Limit | None, span: tuple[float, float]) -> Limit:
     return Limit(min=side(limit.min, span[0]), max=side(limit.max, span[1]))
 
 
-class Problem(Section):
+class Problem(Whole):
     """A move to optimise. Frozen; ``problem.replace(...)`` gives a changed copy.
 
     A load over position keeps the position within its table, as a limit.
@@ -520,10 +519,6 @@ class Problem(Section):
         states = [state.fixed(self.order) for state in (move.start, move.end)]
         return may_rest and any(all(state.get(i) == 0.0 for i in range(1, self.order)) for state in states)
 
-    def replace(self, **sections: Any) -> Problem:
-        """A copy with sections replaced, validated again."""
-        return Problem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
-
     def shown(self, name: str) -> str:
         """The name of a quantity or limit as people of this axis say it: torque on a rotary one."""
         return name.replace("force", "torque") if self.rotary else name
@@ -536,13 +531,3 @@ class Problem(Section):
             return self.replace(limits=self.limits.model_copy(update={quantity: limit.scaled(value / limit.force[0])}))
         sides = {"min": -value, "max": value} if not side else {"min": limit.min, "max": limit.max, side: value}
         return self.replace(limits=self.limits.model_copy(update={quantity: Limit(**sides)}))
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical form: two problems with the same one are the same problem."""
-        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
-
-    def canonical(self) -> dict[str, Any]:
-        """Plain SI data that says everything about the problem, for result files and hashes."""
-        return self.model_dump(mode="json", exclude_none=True)

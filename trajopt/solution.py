@@ -83,16 +83,16 @@ class Solution(Answer):
         return self._moved().at(t)
 
     def plot(self) -> list[Axes]:
-        """Stacked axes of position, velocity, …, power, current with their limits (see `trajopt.plot`). Raises
-        NoSolution."""
-        from trajopt.plot import plot
+        """Stacked axes of position, velocity, …, power, current with their limits (see `trajopt.plots.trajectories`).
+        Raises NoSolution."""
+        from trajopt.plots.trajectories import plot
 
         self._moved()
         return plot(self)
 
     def plot_prices(self) -> Axes:
         """Bars of what each limit, and the time, costs (see `prices`). Raises NoSolution."""
-        from trajopt.plot import plot_prices
+        from trajopt.plots.trajectories import plot_prices
 
         return plot_prices(self)
 
@@ -113,21 +113,21 @@ class Solution(Answer):
         return residual(self._moved(), frequency, damping)
 
     def plot_vibration(self, frequency: Any = None, damping: float | None = None) -> Axes:
-        """Residual vibration over the frequency of a mode; see `trajopt.plot.plot_vibration`. Raises NoSolution."""
-        from trajopt.plot import plot_vibration
+        """Residual vibration over the frequency of a mode; see `trajopt.plots.trajectories`. Raises NoSolution."""
+        from trajopt.plots.trajectories import plot_vibration
 
         return plot_vibration(self, frequency, damping)
 
     def plot_torque_speed(self) -> Axes:
-        """The path in the torque-speed plane, within its limits (see `trajopt.plot_plane`). Raises NoSolution, and
+        """The path in the torque-speed plane, within its limits (see `trajopt.plots.plane`). Raises NoSolution, and
         BadInput without a load."""
-        from trajopt.plot_plane import plot_torque_speed
+        from trajopt.plots.plane import plot_torque_speed
 
         return plot_torque_speed(self)
 
     def plot_arcs(self) -> list[Axes]:
-        """When a minimum-time move runs on which limit (see `trajopt.plot_arcs`). Raises NoSolution."""
-        from trajopt.plot_arcs import plot_arcs
+        """When a minimum-time move runs on which limit (see `trajopt.plots.arcs`). Raises NoSolution."""
+        from trajopt.plots.arcs import plot_arcs
 
         return plot_arcs(self)
 

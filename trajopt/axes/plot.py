@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from trajopt import look, units
-from trajopt.look import COLOURS, DASHES, GREY, SMALL, STYLES, Panels, note, pretty
-from trajopt.plot import curve
+from trajopt import units
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, DASHES, GREY, SMALL, STYLES, Panels, note, pretty
+from trajopt.plots.trajectories import curve
 
 if TYPE_CHECKING:
     from trajopt.axes.motion import Motion

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
@@ -16,7 +14,7 @@ import norms
 from trajopt.axes.arm import Arm, Tip, dynamics_of
 from trajopt.axes.dynamics import Reaching
 from trajopt.errors import BadInput
-from trajopt.fields import Section, nonnegative, sequence
+from trajopt.fields import Section, Whole, nonnegative, sequence
 from trajopt.problem import (
     DERIVATIVES,
     FREE,
@@ -138,7 +136,7 @@ class Search(Section):
     intervals: Annotated[int, _count(4, 1000, 24)] = 24
 
 
-class AxesProblem(Section):
+class AxesProblem(Whole):
     """A motion of several axes to optimise. Frozen; ``problem.replace(...)`` gives a changed copy.
 
     ``arm``: an `ArmSection`, or in code any `trajopt.axes.dynamics.Dynamics`; ``moves`` are the axes as problems of
@@ -240,17 +238,3 @@ class AxesProblem(Section):
     def reaches(self) -> bool:
         """Whether the arm knows where its tip is."""
         return isinstance(self.dynamics, Reaching)
-
-    def replace(self, **sections: Any) -> AxesProblem:
-        """A copy with sections replaced, validated again."""
-        return AxesProblem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical form: two problems with the same one are the same problem."""
-        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
-
-    def canonical(self) -> dict[str, Any]:
-        """Plain SI data that says everything about the problem, for result files and hashes."""
-        return self.model_dump(mode="json", exclude_none=True)

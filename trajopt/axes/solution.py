@@ -16,7 +16,7 @@ from trajopt.axes.problem import AxesProblem
 if TYPE_CHECKING:
     import pandas as pd
 
-    from trajopt.plot import Panels
+    from trajopt.plots.trajectories import Panels
 
 
 @dataclass(frozen=True, repr=False)

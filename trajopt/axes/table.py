@@ -34,7 +34,7 @@ def _columns(axis: Trajectory, time: Floats) -> dict[str, Floats]:
     if len(time) == len(axis.time):
         own = table.frame(axis)
         return {str(key): own[key].to_numpy() for key in own.columns if key != "time"}
-    from trajopt.plot import curve
+    from trajopt.plots.trajectories import curve
 
     within = np.minimum(time, axis.duration)
     found = axis.at(within)

@@ -15,8 +15,8 @@ import numpy as np
 from trajopt import units
 from trajopt.errors import MissingPackage
 from trajopt.files import write_atomically
-from trajopt.look import COLOURS, pretty
-from trajopt.plot import curve, limit_lines, signal_names
+from trajopt.plots.look import COLOURS, pretty
+from trajopt.plots.trajectories import curve, limit_lines, signal_names
 from trajopt.prices import sentence
 
 if TYPE_CHECKING:

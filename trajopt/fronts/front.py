@@ -152,8 +152,8 @@ class Front:
         return frame(self)
 
     def plot(self) -> Axes:
-        """The front with its certified band, anchors and knee (see `trajopt.plot_front`)."""
-        from trajopt.plot_front import plot_front
+        """The front with its certified band, anchors and knee (see `trajopt.fronts.plot`)."""
+        from trajopt.fronts.plot import plot_front
 
         return plot_front(self)
 

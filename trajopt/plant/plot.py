@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from trajopt import look
-from trajopt.look import COLOURS, DASHES, GREY, SHADE, SMALL, Panels
 from trajopt.plant.command import Command
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, DASHES, GREY, SHADE, SMALL, Panels
 
 if TYPE_CHECKING:
     from trajopt.plant.solution import PlantSolution

@@ -6,8 +6,6 @@ Numbers are plain: time in seconds, input and output in units of the user's own.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import isfinite, pi
@@ -17,7 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, ValidationError, ValidationInfo, model_validator
 
 from trajopt.errors import BadInput
-from trajopt.fields import Section, sequence, si
+from trajopt.fields import Section, Whole, sequence, si
 from trajopt.plant.minimum_time import added_poles, band, ends
 from trajopt.plant.plant import Plant
 from trajopt.problem import OneLine
@@ -246,24 +244,10 @@ def translated(section: str = "") -> Iterator[None]:
         raise BadInput(message if not section else f"{section}{'.' if field else ': '}{message}") from None
 
 
-class PlantProblem(Section):
+class PlantProblem(Whole):
     """A minimum-time command to find for a linear plant. Frozen; ``problem.replace(...)`` gives a changed copy."""
 
     plant: PlantSection
     title: OneLine = ""
     source: OneLine = ""
     moral: OneLine = ""
-
-    def replace(self, **sections: Any) -> PlantProblem:
-        """A copy with sections replaced, validated again."""
-        return PlantProblem(**{name: getattr(self, name) for name in type(self).model_fields} | sections)
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical form: two problems with the same one are the same problem."""
-        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
-
-    def canonical(self) -> dict[str, Any]:
-        """Plain data that says everything about the problem, for result files and hashes."""
-        return self.model_dump(mode="json", exclude_none=True)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from trajopt.look import COLOURS, GREY, SMALL, STYLES, dress, pretty
+from trajopt.plots.look import COLOURS, GREY, SMALL, STYLES, dress, pretty
 from trajopt.study.plan import Plan, Plot
 
 _MARKERS: Final = "os^Dv<>"

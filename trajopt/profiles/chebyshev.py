@@ -17,9 +17,9 @@ from numpy.polynomial import Chebyshev, chebyshev
 
 import norms
 from trajopt.errors import BadInput
-from trajopt.laws import Law, loaded, measured, motion, refuse
 from trajopt.mesh import Floats
 from trajopt.problem import Problem
+from trajopt.profiles.laws import Law, loaded, measured, motion, refuse
 
 HIGHEST: Final = 30
 _CONDITIONS: Final = {"JF": 3, "J0": 4}  # of φ and its derivatives, at each end

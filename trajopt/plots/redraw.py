@@ -47,7 +47,7 @@ def redraw(results: Sequence[Path], output: Path, kind: str | None = None, label
 def _drawn(solutions: list[Solution], kind: str, labels: list[str] | None) -> Any:
     if kind != "compare":
         return ALONE[kind](solutions[0])
-    from trajopt.plot import compare
+    from trajopt.plots.trajectories import compare
 
     if len({solution.problem.rotary for solution in solutions}) > 1:
         raise BadInput("compare: linear and rotary axes have no unit in common; draw them apart")

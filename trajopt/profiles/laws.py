@@ -1,7 +1,7 @@
 """Laws of motion in closed form: piecewise polynomials from rest to rest, laid on a move and measured exactly.
 
 A law has stroke from -1 to 1 in time 0 to 1. Its objective is an integral over Gauss points, which no mesh limits: the
-trapezoid, the quintic and the septic that drives offer, and the Chebyshev profiles of `trajopt.chebyshev`.
+trapezoid, the quintic and the septic that drives offer, and the Chebyshev profiles of `trajopt.profiles.chebyshev`.
 """
 
 from __future__ import annotations

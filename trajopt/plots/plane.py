@@ -11,12 +11,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from trajopt import look, units
+from trajopt import units
 from trajopt.errors import BadInput, NoSolution
 from trajopt.fields import Limit
-from trajopt.look import COLOURS, GREY, SMALL, STYLES
 from trajopt.mesh import Floats
-from trajopt.plot import curve
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, GREY, SMALL, STYLES
+from trajopt.plots.trajectories import curve
 from trajopt.problem import Problem
 
 if TYPE_CHECKING:

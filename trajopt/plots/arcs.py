@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from trajopt import look, units
+from trajopt import units
 from trajopt.errors import NoSolution
-from trajopt.look import COLOURS, SMALL, Panels
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, SMALL, Panels
 from trajopt.problem import DERIVATIVES
 
 if TYPE_CHECKING:

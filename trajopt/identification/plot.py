@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajopt import look, units
-from trajopt.look import COLOURS, SMALL, Panels, pretty
-from trajopt.plot_profiles import draw_load
+from trajopt import units
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, SMALL, Panels, pretty
+from trajopt.profiles.plot import draw_load
 from trajopt.quantities import force_along
 from trajopt.signals import OnFloats
 

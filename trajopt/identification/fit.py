@@ -21,8 +21,8 @@ from trajopt import units
 from trajopt.curve import DEGREE, LEAST, Curve
 from trajopt.errors import BadInput
 from trajopt.files import write_atomically
+from trajopt.identification.motions import Motion, bayes
 from trajopt.mesh import Floats
-from trajopt.motions import Motion, bayes
 from trajopt.problem import Load
 from trajopt.quantities import force_along
 from trajopt.signals import OnFloats
@@ -239,7 +239,7 @@ class Identified:
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write load.csv, identification.json and identification.png. Raises OSError."""
-        from trajopt.plot_identification import plot_identification
+        from trajopt.identification.plot import plot_identification
 
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)

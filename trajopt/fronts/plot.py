@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from trajopt.fronts.front import outside
 from trajopt.mesh import Floats
-from trajopt.plot import COLOURS, GREY, SHADE
+from trajopt.plots.trajectories import COLOURS, GREY, SHADE
 
 if TYPE_CHECKING:
     from trajopt.fronts.front import Front

@@ -16,11 +16,11 @@ import numpy as np
 
 from trajopt import checker, units
 from trajopt.answer import seal
-from trajopt.chebyshev import Family, search, search_box
 from trajopt.errors import InternalError
 from trajopt.files import write_atomically
-from trajopt.laws import Laid, Law, refuse, trapezoid
 from trajopt.problem import Problem
+from trajopt.profiles.chebyshev import Family, search, search_box
+from trajopt.profiles.laws import Laid, Law, refuse, trapezoid
 from trajopt.solution import Solution
 from trajopt.table import SYMBOLS
 
@@ -90,7 +90,7 @@ class Profiles:
 
     def save(self, directory: str | Path) -> list[Path]:
         """Write profiles.json, a table of set-points a Chebyshev profile, pictures, and the best move into best/."""
-        from trajopt.plot_profiles import plot_profiles
+        from trajopt.profiles.plot import plot_profiles
 
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """Figures of a solution: stacked panels of position and its derivatives, force and power, with their limits.
 
-The look is that of `trajopt.look`. Curves are the exact interpolant, not lines between samples.
+The look is that of `trajopt.plots.look`. Curves are the exact interpolant, not lines between samples.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from trajopt import look, motor, units
+from trajopt import motor, units
 from trajopt.errors import NoSolution
 from trajopt.fields import Limit
-from trajopt.look import COLOURS, DASHES, GREY, SHADE, SMALL, STYLES, Panels, note, pretty
 from trajopt.mesh import Floats
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, DASHES, GREY, SHADE, SMALL, STYLES, Panels, note, pretty
 from trajopt.problem import DERIVATIVES, FREE
 from trajopt.trajectory import Trajectory
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from trajopt import look, units
-from trajopt.laws import Laid
-from trajopt.look import COLOURS, DASHES, SMALL, STYLES, Panels, pretty
-from trajopt.plot import curve
+from trajopt import units
+from trajopt.plots import look
+from trajopt.plots.look import COLOURS, DASHES, SMALL, STYLES, Panels, pretty
+from trajopt.plots.trajectories import curve
 from trajopt.problem import Load, Problem
+from trajopt.profiles.laws import Laid
 
 if TYPE_CHECKING:
     from trajopt.profiles import Profiles
