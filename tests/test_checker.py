@@ -30,7 +30,8 @@ from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.polynomials import bernstein
 from trajopt.checker.questions import tasks_of
 from trajopt.checker.rational_twin import RationalTwin
-from trajopt.checker.reading import WITHOUT_SOLUTION, read
+from trajopt.checker.reading import read
+from trajopt.checker.values import WITHOUT_SOLUTION
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "snap")
 Data = dict[str, Any]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.checker.case import Array
-from trajopt.checker.reading import Malformed, _mapping, _vector
+from trajopt.checker.values import Malformed, mapping, vector
 
 _KEYS = ("kind", "lengths", "masses", "centres", "inertias", "payload")
 
@@ -32,12 +32,12 @@ class Limbs:
     @classmethod
     def read(cls, arm: Mapping[str, Any]) -> Limbs:
         """From the section of a problem. Raises Malformed."""
-        arm = _mapping(arm, "problem.arm", _KEYS)
-        lengths = _vector(arm.get("lengths"), "arm.lengths")
+        arm = mapping(arm, "problem.arm", _KEYS)
+        lengths = vector(arm.get("lengths"), "arm.lengths")
         given = arm.get("centres")
-        centres = lengths / 2 if given is None else _vector(given, "arm.centres")
-        masses, inertias = (_vector(arm.get(key), f"arm.{key}") for key in ("masses", "inertias"))
-        payload = float(_vector([arm.get("payload", 0.0)], "arm.payload")[0])
+        centres = lengths / 2 if given is None else vector(given, "arm.centres")
+        masses, inertias = (vector(arm.get(key), f"arm.{key}") for key in ("masses", "inertias"))
+        payload = float(vector([arm.get("payload", 0.0)], "arm.payload")[0])
         if len({len(x) for x in (lengths, masses, centres, inertias)}) > 1 or not len(lengths):
             raise Malformed("arm needs as many masses, centres and inertias as lengths")
         if not (np.all(lengths > 0) and np.all(masses > 0) and np.all(inertias >= 0) and payload >= 0):

@@ -19,10 +19,11 @@ from trajopt.checker.axes_reading import FORMAT, Moved, read_moved, terms_of
 from trajopt.checker.case import DERIVATIVES, VALUE, Array, Case, certificate_checks, time_checks
 from trajopt.checker.joint_twin import JointTwin, horner
 from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
-from trajopt.checker.reading import _certificate, _number
+from trajopt.checker.reading import certificate_of
 from trajopt.checker.report import Check, question, to_float
 from trajopt.checker.result_file import _text as read_text
 from trajopt.checker.tip import on_the_path, path_of, thrown
+from trajopt.checker.values import number
 
 __all__ = ["FORMAT", "axes_checks", "motion_table_fault"]
 _BETWEEN: Final = 1e-5  # of a limit on torque or power, which samples between the nodes hold
@@ -157,7 +158,7 @@ def _of_the_arm(moved: Moved, notes: list[str]) -> list[Check]:
     if isinstance(tip, Mapping) and tip.get("velocity") is not None:
         checks += thrown(moved.limbs, tip, moved.release, moved.cases[0].time, q, w)
     if isinstance(tip, Mapping) and (path := path_of(tip)) is not None:
-        width = _number((tip.get("line") or tip["curve"]).get("width"), "tip.width")
+        width = number((tip.get("line") or tip["curve"]).get("width"), "tip.width")
         checks += on_the_path(moved.limbs, path, width, q, _between(moved))
     return checks
 
@@ -186,7 +187,7 @@ def _balance(moved: Moved, q: Array, w: Array) -> Check:
 
 
 def _of_the_certificate(result: Mapping[str, Any], moved: Moved, notes: list[str]) -> list[Check]:
-    found = _certificate(result.get("certificate"))
+    found = certificate_of(result.get("certificate"))
     return certificate_checks(replace(moved.cases[0], objective=moved.objective, **found), notes)
 
 

@@ -13,19 +13,9 @@ from trajopt.checker.case import Case
 from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.joint_twin import JointTwin
 from trajopt.checker.reading import FORMAT as OF_A_MOVE
-from trajopt.checker.reading import (
-    WITH_SOLUTION,
-    WITHOUT_SOLUTION,
-    Malformed,
-    _finite,
-    _mapping,
-    _nonnegative,
-    _number,
-    _vector,
-    read,
-    shown,
-)
+from trajopt.checker.reading import read
 from trajopt.checker.tip import path_of
+from trajopt.checker.values import Malformed, all_finite, is_solved, mapping, nonnegative, number, vector
 
 FORMAT: Final = "trajopt axes 1"
 _NUMBERS: Final = ("objective", "duration", "metrics", "axes")
@@ -50,19 +40,10 @@ class Moved:
 
 def read_moved(result: Mapping[str, Any], notes: list[str]) -> Moved | None:
     """The motion, None when its status is one without a solution. Raises Malformed."""
-    for key in ("trajopt", "status", "problem_hash", "problem", *_NUMBERS):
-        if key not in result:
-            raise Malformed(f"{key} is missing")
-    status = result["status"]
-    if status in WITHOUT_SOLUTION:
-        for key in _NUMBERS:
-            if result[key] is not None:
-                raise Malformed(f"{status} must carry no numbers, but {key} is not null")
+    if not is_solved(result, ("trajopt", "status", "problem_hash", "problem", *_NUMBERS), _NUMBERS):
         return None
-    if status not in WITH_SOLUTION:
-        raise Malformed(f"unknown status {shown(status)}")
-    problem = _mapping(result["problem"], "problem", _KNOWN)
-    _finite(problem, "problem")
+    problem = mapping(result["problem"], "problem", _KNOWN)
+    all_finite(problem, "problem")
     axes, found = problem.get("axes"), result["axes"]
     if not isinstance(axes, list | tuple) or not isinstance(found, list | tuple) or len(axes) != len(found):
         raise Malformed("axes: as many trajectories as axes are needed")
@@ -71,12 +52,12 @@ def read_moved(result: Mapping[str, Any], notes: list[str]) -> Moved | None:
     limbs = Limbs.read(arm) if known and isinstance(arm, Mapping) else None
     if limbs is not None and len(limbs.lengths) != len(axes):
         raise Malformed("arm has another number of links than there are axes")
-    names = tuple(str(_mapping(axis, "an axis").get("name")) for axis in axes)
+    names = tuple(str(mapping(axis, "an axis").get("name")) for axis in axes)
     cases = tuple(_case(result, k, arm is not None, notes) for k in range(len(axes)))
     return Moved(
         problem, names, cases, _twins(cases, limbs, found, arm is not None), limbs, arm is not None,
-        _number(result["objective"], "objective"), _number(result["duration"], "duration"),
-        None if result.get("release") is None else _number(result["release"], "release"),
+        number(result["objective"], "objective"), number(result["duration"], "duration"),
+        None if result.get("release") is None else number(result["release"], "release"),
     )  # fmt: skip
 
 
@@ -87,7 +68,7 @@ def _twins(cases: Sequence[Case], limbs: Limbs | None, found: Sequence[Any], arm
         raise Malformed("the joints of an arm need one time grid")
     twins = []
     for k, case in enumerate(cases):
-        given = None if limbs is not None else _vector(found[k].get("torque"), "axes.torque")
+        given = None if limbs is not None else vector(found[k].get("torque"), "axes.torque")
         if given is not None and len(given) != len(case.time):
             raise Malformed("axes.torque needs a value a node")
         twins.append(JointTwin(case, k, limbs, given))
@@ -99,19 +80,19 @@ def _twins(cases: Sequence[Case], limbs: Limbs | None, found: Sequence[Any], arm
 def _case(result: Mapping[str, Any], k: int, armed: bool, notes: list[str]) -> Case:
     """An axis as a move of its own. On an arm its inertia is a placeholder that `JointTwin` never looks at."""
     problem = result["problem"]
-    axis, move = _mapping(problem["axes"][k], "an axis"), _mapping(problem.get("move"), "problem.move")
-    own, trajectory = _mapping(axis.get("move"), "an axis.move"), _mapping(result["axes"][k], "axes").get("trajectory")
+    axis, move = mapping(problem["axes"][k], "an axis"), mapping(problem.get("move"), "problem.move")
+    own, trajectory = mapping(axis.get("move"), "an axis.move"), mapping(result["axes"][k], "axes").get("trajectory")
     terms = [{"minimize": name, "norm": norm, "weight": 1.0} for name, norm, _, _ in terms_of(problem)]
-    load = dict(_mapping(axis.get("load", {}), "load"))
+    load = dict(mapping(axis.get("load", {}), "load"))
     if armed and load.keys() - {"inertia", "viscous", *_DEFAULTS}:
         raise Malformed("the load of a joint is the arm")
     if armed:
         load = {"inertia": 1.0, "viscous": load.get("viscous", 0.0)}
     path = isinstance(problem.get("tip"), Mapping) and path_of(problem["tip"]) is not None
     start, end = ({**own.get(key, {}), **({"position": "free"} if path else {})} for key in ("start", "end"))
-    time, ended = move.get("time"), _vector(_mapping(trajectory, "trajectory").get("time"), "trajectory.time")
+    time, ended = move.get("time"), vector(mapping(trajectory, "trajectory").get("time"), "trajectory.time")
     name = f"{axis.get('name')}."
-    metrics = _mapping(result["metrics"], "metrics")
+    metrics = mapping(result["metrics"], "metrics")
     case = read(
         {
             **result, "format": OF_A_MOVE, "objective": 0.0, "certificate": None, "trajectory": trajectory,
@@ -133,10 +114,10 @@ def _case(result: Mapping[str, Any], k: int, armed: bool, notes: list[str]) -> C
 def terms_of(problem: Mapping[str, Any]) -> Iterator[tuple[str, str | None, tuple[float, ...], str]]:
     """(quantity, norm, weight an axis, sum or max) of every term; the time has one weight."""
     count = len(problem["axes"])
-    for term in _mapping(problem.get("objective"), "objective").get("terms", ()):
-        term = _mapping(term, "an objective term", ("minimize", "norm", "weight", "axes", "combine"))
-        weight, shares = _nonnegative(term.get("weight", 1.0), "weight"), term.get("axes")
-        own = np.ones(count) if shares is None else _vector(shares, "objective.axes")
+    for term in mapping(problem.get("objective"), "objective").get("terms", ()):
+        term = mapping(term, "an objective term", ("minimize", "norm", "weight", "axes", "combine"))
+        weight, shares = nonnegative(term.get("weight", 1.0), "weight"), term.get("axes")
+        own = np.ones(count) if shares is None else vector(shares, "objective.axes")
         if len(own) != count or np.any(own < 0) or term.get("combine", "sum") not in ("sum", "max"):
             raise Malformed("an objective term needs a weight an axis, and combine sum or max")
         if term.get("minimize") == "time":

@@ -20,9 +20,10 @@ from trajopt.checker.float_twin import FloatTwin
 from trajopt.checker.laws import FORMAT as PROFILES
 from trajopt.checker.laws import law_checks
 from trajopt.checker.questions import STRICT, USUAL, decide, metric_names
-from trajopt.checker.reading import Malformed, read
+from trajopt.checker.reading import read
 from trajopt.checker.report import Check, Report, question
 from trajopt.checker.result_file import CheckerInputError, read_json, table_fault
+from trajopt.checker.values import Malformed
 from trajopt.checker.vibration import vibration_checks
 
 FRONT: Final = "trajopt front 1"

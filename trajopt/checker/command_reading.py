@@ -10,17 +10,8 @@ import numpy as np
 
 from trajopt.checker.case import Array
 from trajopt.checker.linear_system import System, chain
-from trajopt.checker.reading import (
-    _NUMBERS,
-    WITH_SOLUTION,
-    WITHOUT_SOLUTION,
-    Malformed,
-    _certificate,
-    _mapping,
-    _number,
-    _vector,
-    shown,
-)
+from trajopt.checker.reading import certificate_of
+from trajopt.checker.values import Malformed, is_solved, mapping, number, shown, vector
 
 FORMAT: Final = "trajopt command 1"
 _CLAIMED: Final = ("objective", "duration", "metrics", "command")
@@ -67,22 +58,14 @@ class Commanded:
 
 def read_command(result: Mapping[str, Any], notes: list[str]) -> Commanded | None:
     """The result as a command, None when its status is one without a solution. Raises Malformed."""
-    for key in ("trajopt", "status", "problem_hash", "problem", *_CLAIMED):
-        if key not in result:
-            raise Malformed(f"{key} is missing")
-    status = result["status"]
-    if status in WITHOUT_SOLUTION:
-        for key in (*_NUMBERS, "command"):
-            if result.get(key) is not None:
-                raise Malformed(f"{status} must carry no numbers, but {key} is not null")
+    required = ("trajopt", "status", "problem_hash", "problem", *_CLAIMED)
+    if not is_solved(result, required, _CLAIMED):
         return None
-    if status not in WITH_SOLUTION:
-        raise Malformed(f"unknown status {shown(status)}")
-    problem = _mapping(result["problem"], "problem")
+    problem = mapping(result["problem"], "problem")
     notes += [f"problem.{key}" for key in problem if key not in ("plant", "title", "source", "moral")]
-    stated = _mapping(problem.get("plant"), "problem.plant", _PLANT)
-    command = _mapping(result["command"], "command", ("times", "levels", "final_input", "sigma"))
-    time, levels = _vector(command.get("times"), "command.times"), _vector(command.get("levels"), "command.levels")
+    stated = mapping(problem.get("plant"), "problem.plant", _PLANT)
+    command = mapping(result["command"], "command", ("times", "levels", "final_input", "sigma"))
+    time, levels = vector(command.get("times"), "command.times"), vector(command.get("levels"), "command.levels")
     if len(time) < 2 or time[0] != 0 or not np.all(np.diff(time) > 0):
         raise Malformed("command.times must start at 0 and increase")
     if len(time) > _MOST_JUMPS:
@@ -97,35 +80,35 @@ def read_command(result: Mapping[str, Any], notes: list[str]) -> Commanded | Non
     low, high = _pair(stated.get("input"), "plant.input")
     wanted = stated.get("final_input")
     metrics = {
-        str(name): _number(value, f"metrics.{name}") for name, value in _mapping(result["metrics"], "metrics").items()
+        str(name): number(value, f"metrics.{name}") for name, value in mapping(result["metrics"], "metrics").items()
     }
     return Commanded(
         plant=plant, poles=tuple(poles), added=added, modes=_upper(poles), low=low, high=high,
-        final_value=_number(stated.get("final_value"), "plant.final_value"),
-        wanted_input=None if wanted is None else _number(wanted, "plant.final_input"),
-        time=time, levels=levels, final_input=_number(command.get("final_input"), "command.final_input"),
-        sigma=_sigma(command.get("sigma")), solved=status == "SOLVED",
-        objective=_number(result["objective"], "objective"), duration=_number(result["duration"], "duration"),
-        metrics=metrics, **_certificate(result.get("certificate")),
+        final_value=number(stated.get("final_value"), "plant.final_value"),
+        wanted_input=None if wanted is None else number(wanted, "plant.final_input"),
+        time=time, levels=levels, final_input=number(command.get("final_input"), "command.final_input"),
+        sigma=_sigma(command.get("sigma")), solved=result["status"] == "SOLVED",
+        objective=number(result["objective"], "objective"), duration=number(result["duration"], "duration"),
+        metrics=metrics, **certificate_of(result.get("certificate")),
     )  # fmt: skip
 
 
 def _plant(stated: Mapping[str, Any], duration: float) -> tuple[System, list[complex]]:
     """The plant of a problem and its poles, in times of ``duration`` (s)."""
     if stated.get("A") is not None:
-        b, c = (_vector(stated.get(key), f"plant.{key}") for key in ("B", "C"))
-        rows = [_vector(row, "plant.A") for row in (stated["A"] if isinstance(stated["A"], list | tuple) else ())]
+        b, c = (vector(stated.get(key), f"plant.{key}") for key in ("B", "C"))
+        rows = [vector(row, "plant.A") for row in (stated["A"] if isinstance(stated["A"], list | tuple) else ())]
         a = np.array(rows) if len({len(row) for row in rows}) == 1 else np.empty(0)
         if not 0 < len(b) <= _MOST_STATES or a.shape != (len(b), len(b)) or len(c) != len(b):
             raise Malformed("plant: A, B and C do not fit together")
-        system = System(a * duration, b * duration, c, _number(stated.get("D", 0.0), "plant.D")).balanced()
+        system = System(a * duration, b * duration, c, number(stated.get("D", 0.0), "plant.D")).balanced()
         return system, _eigenvalues(system.a)
     if stated.get("poles") is not None:
         poles, zeros = (_roots(stated.get(key, ()), f"plant.{key}") for key in ("poles", "zeros"))
-        gain = _number(stated.get("gain", 1.0), "plant.gain")
+        gain = number(stated.get("gain", 1.0), "plant.gain")
     else:
         upper, lower = (
-            np.trim_zeros(_vector(stated.get(key), f"plant.{key}"), "f") for key in ("numerator", "denominator")
+            np.trim_zeros(vector(stated.get(key), f"plant.{key}"), "f") for key in ("numerator", "denominator")
         )
         if not len(upper) or not len(lower):
             raise Malformed("plant: numerator and denominator must not vanish")
@@ -154,11 +137,11 @@ def _added(robust: Any, poles: list[complex], duration: float) -> tuple[complex,
         return ()
     if robust == "zvd":
         return tuple(x for p in _upper(poles) for x in (p, p.conjugate()))
-    stated = _mapping(robust, "plant.robust", ("band", "damping", "count", "poles"))
+    stated = mapping(robust, "plant.robust", ("band", "damping", "count", "poles"))
     if stated.get("poles") is not None:
         return tuple(p * duration for p in _roots(stated["poles"], "plant.robust.poles"))
     low, high = _pair(stated.get("band"), "plant.robust.band")
-    damping, count = _number(stated.get("damping", 0.0), "damping"), _number(stated.get("count", 3), "count")
+    damping, count = number(stated.get("damping", 0.0), "damping"), number(stated.get("count", 3), "count")
     if not 0 <= damping < 1 or not 1 <= count <= _MOST_STATES:
         raise Malformed("plant.robust: damping must be 0 to 1, count from 1 on")
     rates = 2 * np.pi * duration * np.linspace(low, high, int(count))
@@ -183,7 +166,7 @@ def _roots(value: Any, where: str) -> list[complex]:
         raise Malformed(f"{where} is not a list")
     found = []
     for root in value:
-        parts = _vector(root if isinstance(root, list | tuple) else [root, 0.0], where)
+        parts = vector(root if isinstance(root, list | tuple) else [root, 0.0], where)
         if len(parts) != 2:
             raise Malformed(f"{where} holds {shown(root)}, neither a number nor [re, im]")
         found.append(complex(*parts))
@@ -194,7 +177,7 @@ def _roots(value: Any, where: str) -> list[complex]:
 
 
 def _pair(value: Any, where: str) -> tuple[float, float]:
-    if len(pair := _vector(value, where)) != 2:
+    if len(pair := vector(value, where)) != 2:
         raise Malformed(f"{where} is no pair")
     return float(pair[0]), float(pair[1])
 
@@ -203,8 +186,8 @@ def _sigma(value: Any) -> tuple[Array, Array] | None:
     """Samples of the switching function: times (s) and values."""
     if value is None:
         return None
-    stated = _mapping(value, "command.sigma", ("time", "value"))
-    time, values = (_vector(stated.get(key), f"command.sigma.{key}") for key in ("time", "value"))
+    stated = mapping(value, "command.sigma", ("time", "value"))
+    time, values = (vector(stated.get(key), f"command.sigma.{key}") for key in ("time", "value"))
     if len(time) != len(values):
         raise Malformed("command.sigma needs as many values as times")
     return time, values

@@ -18,9 +18,10 @@ import numpy as np
 from trajopt.checker.case import EPS, TOTALS, VALUE, Array, Case
 from trajopt.checker.checking import check_file
 from trajopt.checker.float_twin import FloatTwin
-from trajopt.checker.reading import Malformed, read, shown
+from trajopt.checker.reading import read
 from trajopt.checker.report import Check, question, to_float
 from trajopt.checker.result_file import CheckerInputError, read_json
+from trajopt.checker.values import Malformed, shown
 
 _PLACE: Final = re.compile(r"points/[0-9]{3,6}/result\.json")
 _KEYS: Final = ("objectives", "points", "planes", "corners", "ideal", "nadir", "error", "convex", "blends", "status")

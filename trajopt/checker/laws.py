@@ -11,8 +11,9 @@ from numpy.polynomial import chebyshev
 
 from trajopt.checker.case import POWERS, TOTALS, VALUE, Array, Case
 from trajopt.checker.float_twin import FloatTwin
-from trajopt.checker.reading import Malformed, _mapping, _number, _vector, ends, shown, stated
+from trajopt.checker.reading import ends, stated
 from trajopt.checker.report import Check, question, to_float
+from trajopt.checker.values import Malformed, mapping, number, shown, vector
 
 FORMAT: Final = "trajopt profiles 1"
 _PARTS: Final = 64  # of every piece: short enough for powers
@@ -26,14 +27,14 @@ _ENERGIES: Final = {"energy": "l1", "copper_loss": "copper", "electrical_energy"
 def law_checks(result: Mapping[str, Any], notes: list[str]) -> list[Check]:
     """Every check of a file of profiles; what is not as it should be is a failed one."""
     try:
-        problem = _mapping(result.get("problem"), "problem")
+        problem = mapping(result.get("problem"), "problem")
         laws = result.get("laws")
         if not isinstance(laws, list | tuple) or not laws:
             raise Malformed("laws is missing or empty")
-        best = _mapping(result.get("best"), "best")
+        best = mapping(result.get("best"), "best")
         checks = [question("structure")]
         for law in laws:
-            checks += _law(problem, _mapping(law, "a law"), best.get("objective"), notes)
+            checks += _law(problem, mapping(law, "a law"), best.get("objective"), notes)
         return checks
     except Malformed as fault:
         return [question("structure", str(fault))]
@@ -53,8 +54,8 @@ def _law(problem: Mapping[str, Any], law: Mapping[str, Any], best: Any, notes: l
         checks += [_end(name, case, problem, which, conditions) for which in ("start", "end")]
         checks.append(question(f"{name} limits", _broken_fault(twin, law.get("breaks"))))
     if best is not None:
-        above = case.objective / _number(best, "best.objective") - 1
-        off = abs(_number(law.get("above"), f"{name}.above") - above)
+        above = case.objective / number(best, "best.objective") - 1
+        off = abs(number(law.get("above"), f"{name}.above") - above)
         checks.append(Check(f"{name} above the best", off, VALUE, None, off <= VALUE))
     return checks
 
@@ -71,11 +72,11 @@ def _case(problem: Mapping[str, Any], law: Mapping[str, Any], notes: list[str]) 
         raise Malformed(f"{law.get('name')} has no pieces")
     borders, tables = [0.0], []
     for piece in pieces:
-        one = _mapping(piece, "a piece", ("from", "to", "coefficients"))
-        coefficients = _vector(one.get("coefficients"), "coefficients")
-        if not 1 <= len(coefficients) <= _DEGREES or _number(one.get("from"), "from") != borders[-1]:
+        one = mapping(piece, "a piece", ("from", "to", "coefficients"))
+        coefficients = vector(one.get("coefficients"), "coefficients")
+        if not 1 <= len(coefficients) <= _DEGREES or number(one.get("from"), "from") != borders[-1]:
             raise Malformed(f"{law.get('name')}: pieces must join, and have 1 to {_DEGREES} coefficients")
-        borders.append(_number(one.get("to"), "to"))
+        borders.append(number(one.get("to"), "to"))
         tables.append(coefficients)
     if abs(borders[-1] - 1) > _END or min(np.diff(borders)) <= 0:
         raise Malformed(f"{law.get('name')}: pieces must run from 0 to 1")
@@ -94,7 +95,7 @@ def _case(problem: Mapping[str, Any], law: Mapping[str, Any], notes: list[str]) 
     signal = (*scaled[:-1], scaled[-1][:-1])
     case = Case(
         scheme="exact", order=order, time=np.concatenate(time) * duration, signal=signal, start=start, end=end, via=(),
-        objective=_number(law.get("objective"), "objective"), duration=duration, metrics={}, lower_bound=None, gap=None,
+        objective=number(law.get("objective"), "objective"), duration=duration, metrics={}, lower_bound=None, gap=None,
         has_certificate=False, **parts,
     )  # fmt: skip
     return case, jumps

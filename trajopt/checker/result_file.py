@@ -15,7 +15,7 @@ import numpy as np
 
 from trajopt.checker.case import DERIVATIVES, LOADED, Array, Case
 from trajopt.checker.float_twin import FloatTwin, Instants, friction_signs
-from trajopt.checker.reading import shown
+from trajopt.checker.values import shown
 
 LARGEST_FILE: Final = 512 * 2**20
 _COLUMNS: Final = {

@@ -10,8 +10,8 @@ from numpy.polynomial import polynomial
 
 from trajopt.checker.arm import Limbs
 from trajopt.checker.case import Array
-from trajopt.checker.reading import _mapping, _number, _vector
 from trajopt.checker.report import Check, question
+from trajopt.checker.values import mapping, number, vector
 
 _TUBE: Final = 1e-5  # of the width of a path, between the nodes
 _TIP: Final = 1e-6
@@ -25,11 +25,11 @@ def thrown(
     end, asked = float(time[-1]), tip.get("release", "end")
     if at is None or not 0 < at <= end * (1 + _TIME):
         return [question("release", "the time of the release is missing, or not within the motion")]
-    wanted = end if asked == "end" else at if asked == "free" else _number(asked, "tip.release")
+    wanted = end if asked == "end" else at if asked == "free" else number(asked, "tip.release")
     k = int(np.argmin(np.abs(time - at)))
     off = max(abs(at - wanted), abs(float(time[k]) - at))
     checks = [Check("release", off, _TIME * end, at, off <= _TIME * end)]
-    velocity = complex(*_vector(tip["velocity"], "tip.velocity"))
+    velocity = complex(*vector(tip["velocity"], "tip.velocity"))
     miss = float(abs(limbs.tip(q[:, k : k + 1], w[:, k : k + 1])[1][0] - velocity))
     tolerance = _TIP * max(abs(velocity), 1e-3)
     return [*checks, Check("tip velocity", miss, tolerance, at, miss <= tolerance)]
@@ -38,13 +38,13 @@ def thrown(
 def path_of(tip: Mapping[str, Any]) -> Array | None:
     """The complex coefficients of the path that the tip follows, lowest power of the path parameter first."""
     if tip.get("line") is not None:
-        line = _mapping(tip["line"], "tip.line", ("start", "end", "width", "elbow"))
-        start, end = (complex(*_vector(line.get(key), f"tip.line.{key}")) for key in ("start", "end"))
+        line = mapping(tip["line"], "tip.line", ("start", "end", "width", "elbow"))
+        start, end = (complex(*vector(line.get(key), f"tip.line.{key}")) for key in ("start", "end"))
         return np.array([start, end - start])
     if tip.get("curve") is None:
         return None
-    curve = _mapping(tip["curve"], "tip.curve", ("x", "y", "width", "elbow"))
-    x, y = (_vector(curve.get(key), f"tip.curve.{key}") for key in ("x", "y"))
+    curve = mapping(tip["curve"], "tip.curve", ("x", "y", "width", "elbow"))
+    x, y = (vector(curve.get(key), f"tip.curve.{key}") for key in ("x", "y"))
     found = np.zeros(max(len(x), len(y), 2), dtype=complex)
     found[: len(x)] += x
     found[: len(y)] += 1j * y
