@@ -24,7 +24,7 @@ SMALL: Final[dict[str, Any]] = {
 
 
 def cases(count: int, spoilt: bool) -> plan.Plan:
-    """Small moves of different lengths; when spoilt, 3 % are impossible and 20 are poison."""
+    """Small moves of different lengths, 41 or more; when spoilt, 3 % are impossible and 20 are poison."""
     rows: list[dict[str, Any]] = [{"move.end.position": f"{100 + i / 100:g} mm"} for i in range(count)]
     if spoilt:
         for i in range(0, count, 33):

@@ -331,7 +331,11 @@ def move(tmp_path: Path) -> Path:
 
 
 def test_the_command(move: Path, tmp_path: Path) -> None:
-    done = run("pareto", move, "--objectives", "energy,peak_power", "--error", "10%", "-o", tmp_path / "out", "--json")
+    words = ["pareto", move, "--objectives", "energy,peak_power", "--error", "10%"]
+    done = run(*words, "-o", tmp_path / "out", "--explore", "--json")
+    page = (tmp_path / "out" / "front.html").read_text()
+    assert "plotly_click" in page and "of energy saves" in page
+    assert "give --output" in run(*words, "--explore").stderr
     front = json.loads(done.stdout)
     assert done.returncode == 0 and front["format"] == FORMAT and front["status"] == "SOLVED"
     assert front["error"] <= 0.1 == front["asked"] and done.stderr == ""

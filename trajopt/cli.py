@@ -143,6 +143,9 @@ def pareto(
     ] = None,
     method: Annotated[str, typer.Option("--method", help="weights (eq. 26) or epsilon (ceilings)")] = "weights",
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the front into this folder")] = None,
+    explore: Annotated[
+        bool, typer.Option("--explore", help="write front.html as well, a page to click through the points")
+    ] = False,
     workers: Annotated[int, typer.Option("--workers", help="processes that solve at once")] = 1,
     overrides: Overrides = [],  # noqa: B006 (typer reads the default)
     as_json: AsJson = False,
@@ -154,8 +157,12 @@ def pareto(
     problem = problem_file.load(source, overrides)
     asked = {"points": points, "error": command.read_error(error), "method": method}
     search = command.ready(problem, objectives, workers, asked)
+    if explore and output is None:
+        raise BadInput("--explore: needs a folder to write into; give --output")
     _make_folder(output)
     front = command.run(search, workers, output)
+    if explore and output is not None and front.points:
+        front.explore().save(output / "front.html")
     if as_json:
         print(json.dumps(front.sealed(), allow_nan=False))
     else:
