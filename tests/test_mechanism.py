@@ -122,7 +122,7 @@ def test_forty_random_starts_reach_the_same_optimum() -> None:
 
 
 def test_ipopt_has_exact_derivatives_of_the_curves() -> None:
-    from trajopt.model_pyomo import NonconvexModel, _interface
+    from trajopt.model_pyomo import NonconvexModel
     from trajopt.objective import lower
     from trajopt.transcribe import transcribe
 
@@ -130,7 +130,7 @@ def test_ipopt_has_exact_derivatives_of_the_curves() -> None:
     setting, model = Setting.of(problem), NonconvexModel()
     transcript = transcribe(setting, model, slider_crank.DURATION)
     model.minimize(lower(transcript, problem.objective).expression)
-    nlp, _, _ = _interface(model._model, model._curves, None)
+    nlp, _, _ = model._interface(None)
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0.1, 0.9, nlp.n_primals()), rng.standard_normal(nlp.n_constraints())
 

@@ -21,7 +21,7 @@ from tests.conftest import PUBLISHED_CURVES
 from tests.reference.clemen_rupp_scara import PublishedArm
 from trajopt import cli, problem_file, transcribe
 from trajopt.attempt import Clock
-from trajopt.axes.attempt import on_mesh, run
+from trajopt.axes.attempt import AxesProgram, on_mesh
 from trajopt.axes.explain import forward_only_speed, limits_bound
 from trajopt.axes.motion import Motion, driven
 from trajopt.axes.starts import Guess, guesses
@@ -58,7 +58,7 @@ def test_spec_a_on_three_meshes(throw: trajopt.AxesSolution) -> None:
     setting, clock = AxesSetting.of(throw.problem), Clock()
     found = {200: throw.objective}
     for intervals in (50, 100):
-        attempt = run(on_mesh(setting, intervals), Guess.from_motion(throw.moved()), clock)
+        attempt = AxesProgram(on_mesh(setting, intervals), clock).run(Guess.from_motion(throw.moved()))
         found[intervals] = attempt.value
     assert found == pytest.approx(SPEC_A, rel=1e-5)
 
@@ -185,9 +185,8 @@ def test_the_command_animates_arms_alone(tmp_path: Path, capsys: pytest.CaptureF
 
 def test_fifty_seeds_of_the_sampler_on_a_coarse_mesh() -> None:
     problem = changed(trajopt.load("scara_throw"), starts=50)
-    setting = on_mesh(AxesSetting.of(problem), 16)
-    clock = Clock()
-    found = [run(setting, guess, clock) for guess in guesses(problem)]
+    program = AxesProgram(on_mesh(AxesSetting.of(problem), 16), Clock())
+    found = [program.run(guess) for guess in guesses(problem)]
     assert sum(attempt.motion is not None for attempt in found) == 50
 
 
@@ -248,7 +247,8 @@ def test_with_correct_dynamics_between_the_nodes_too(monkeypatch: pytest.MonkeyP
     everywhere = solved(problem)
     assert everywhere.objective == pytest.approx(401.3473, rel=1e-6)
     monkeypatch.setattr(transcribe, "_between", lambda signal: [])
-    at_nodes = run(AxesSetting.of(problem), Guess.from_motion(everywhere.moved()), Clock(), "ipopt-adaptive")
+    program = AxesProgram(AxesSetting.of(problem), Clock())
+    at_nodes = program.run(Guess.from_motion(everywhere.moved()), "ipopt-adaptive")
     assert at_nodes.value == pytest.approx(401.333, rel=1e-6)
 
 

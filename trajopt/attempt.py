@@ -133,7 +133,7 @@ def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, wid
     model = NonconvexModel()
     duration: Any = setting.problem.move.fixed_time
     if duration is None:
-        duration = free_duration(setting, model, start.duration)
+        duration = free_duration(setting, model, start.duration)[0]
     by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
     transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
     for x, values in zip(transcript.chain, start.chain, strict=True):
@@ -148,12 +148,12 @@ def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, wid
 
 
 def free_duration(setting: Setting, model: Any, start: float) -> Any:
-    """A duration that the model chooses, within its range, scaled, and started at ``start`` s."""
+    """(1,) a duration that the model chooses, within its range, scaled, and started at ``start`` s."""
     time, size = setting.problem.move.time, setting.sizes.duration
     shortest, longest = time if isinstance(time, tuple) else (0.01 * size, np.inf)
     free = model.vector(1, size, np.array([shortest]), np.array([longest]))
     model.start(free, np.array([start]))
-    return free[0]
+    return free
 
 
 def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:

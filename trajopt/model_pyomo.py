@@ -57,6 +57,14 @@ class NonconvexModel:
         self._named: list[tuple[str, list[Any], float, Floats, Floats]] = []
         self._contradiction = ""
         self._curves: list[Along] = []
+        self._initial: list[tuple[Any, Any]] = []
+        self._nlp: Any = None
+
+    def afresh(self) -> None:
+        """Every variable as it was when this was called first: for another start of the same program."""
+        self._initial = self._initial or [(x, x.value) for _, xs, _ in self._vectors for x in xs.values()]
+        for variable, value in self._initial:
+            variable.set_value(value, skip_validation=True)
 
     def vector(
         self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None, origin: float = 0.0
@@ -202,10 +210,10 @@ class NonconvexModel:
             return Outcome(Claim.FAILED, self._contradiction)
         for along in self._curves:
             along.start(self.value(along.position))
-        nlp, problem, deadline = _interface(self._model, self._curves, seconds)
+        nlp, problem, deadline = self._interface(seconds)
         for option, setting in (_OPTIONS | RUNGS[solver]).items():
             problem.add_option(option, setting)
-        x, info = problem.solve(nlp.init_primals())
+        x, info = problem.solve(np.array([x.value or 0.0 for x in nlp.get_pyomo_variables()]))
         status = int(info["status"])
         claim = Claim.LIMIT if deadline.passed else _CLAIMS.get(status, Claim.FAILED)
         message = info["status_msg"].decode().partition(":")[0].partition(" (")[0]
@@ -230,9 +238,31 @@ class NonconvexModel:
         return {name: Prices(*map(np.concatenate, zip(*parts, strict=True))) for name, parts in found.items()}
 
     def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        nlp, _, _ = _interface(self._model, self._curves, None)
+        nlp, _, _ = self._interface(None)
         nlp.set_primals(pair[0])
         return float(nlp.evaluate_objective() + pair[1] @ nlp.evaluate_constraints())
+
+    def _interface(self, seconds: float | None) -> tuple[Any, Any, _Deadline]:
+        """The program as PyNumero and cyipopt see it; written once. Raises MissingSolver."""
+        from pyomo.contrib.pynumero.asl import AmplInterface
+
+        library = Path(sys.prefix) / "lib" / "libpynumero_ASL.so"
+        if library.exists():  # compiled into the environment by the set-up, where PyNumero does not look
+            AmplInterface.libname = str(library)
+        try:
+            from pyomo.contrib.pynumero.interfaces.cyipopt_interface import CyIpoptNLP
+            from pyomo.contrib.pynumero.interfaces.pyomo_nlp import PyomoNLP
+
+            if self._nlp is None:
+                curves = self._curves
+                self._nlp = curved(PyomoNLP)(self._model, curves) if curves else PyomoNLP(self._model)
+            deadline = _Deadline(seconds)
+            return self._nlp, CyIpoptNLP(self._nlp, intermediate_callback=deadline), deadline
+        except (ImportError, RuntimeError) as error:
+            raise MissingSolver(
+                "Ipopt is not available: install Debian's coinor-libipopt-dev and libamplsolver-dev, then run 'make"
+                f" demo' ({' '.join(str(error).split())[:200]})"
+            ) from error
 
 
 class _Deadline:
@@ -247,23 +277,3 @@ class _Deadline:
         self.iterations = iteration
         self.passed = self._end is not None and perf_counter() > self._end
         return not self.passed
-
-
-def _interface(model: Any, curves: list[Along], seconds: float | None) -> tuple[Any, Any, _Deadline]:
-    from pyomo.contrib.pynumero.asl import AmplInterface
-
-    library = Path(sys.prefix) / "lib" / "libpynumero_ASL.so"
-    if library.exists():  # compiled into the environment by the set-up, where PyNumero does not look
-        AmplInterface.libname = str(library)
-    try:
-        from pyomo.contrib.pynumero.interfaces.cyipopt_interface import CyIpoptNLP
-        from pyomo.contrib.pynumero.interfaces.pyomo_nlp import PyomoNLP
-
-        nlp = curved(PyomoNLP)(model, curves) if curves else PyomoNLP(model)
-        deadline = _Deadline(seconds)
-        return nlp, CyIpoptNLP(nlp, intermediate_callback=deadline), deadline
-    except (ImportError, RuntimeError) as error:
-        raise MissingSolver(
-            "Ipopt is not available: install Debian's coinor-libipopt-dev and libamplsolver-dev, then run 'make demo'"
-            f" ({' '.join(str(error).split())[:200]})"
-        ) from error

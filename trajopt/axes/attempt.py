@@ -28,26 +28,34 @@ class AxesAttempt:
     value: float = np.nan
 
 
-def run(setting: AxesSetting, start: Guess, clock: Clock, rung: str = "ipopt") -> AxesAttempt:
-    """A local optimum by Ipopt, from a start; ``rung``: one of `trajopt.model_pyomo.RUNGS`."""
-    from trajopt.model_pyomo import NonconvexModel
+class AxesProgram:
+    """The program of a setting, built once, for any number of starts."""
 
-    since, model = perf_counter(), NonconvexModel()
-    duration: Any = setting.problem.fixed_time
-    if duration is None:
-        duration = free_duration(setting.axes[0], model, start.duration)
-    transcript = transcribe(setting, model, duration)
-    _begin(setting, model, transcript, start)
-    lowered = lower(transcript.axes, setting.problem.objective)
-    model.minimize(lowered.expression)
-    clock.charge("model", since)
-    since = perf_counter()
-    outcome = model.run(rung, clock.left())
-    clock.charge("solve", since)
-    if outcome.claim is not Claim.OPTIMAL:
-        return AxesAttempt(outcome)
-    motion = _read(setting, model, transcript)
-    return AxesAttempt(outcome, motion, motion.objective)
+    def __init__(self, setting: AxesSetting, clock: Clock) -> None:
+        from trajopt.model_pyomo import NonconvexModel
+
+        since = perf_counter()
+        self._setting, self._clock, self._model = setting, clock, NonconvexModel()
+        duration, self._free = setting.problem.fixed_time, None
+        if duration is None:
+            self._free = free_duration(setting.axes[0], self._model, setting.axes[0].sizes.duration)
+        self._transcript = transcribe(setting, self._model, duration if self._free is None else self._free[0])
+        self._model.minimize(lower(self._transcript.axes, setting.problem.objective).expression)
+        clock.charge("model", since)
+
+    def run(self, start: Guess, rung: str = "ipopt") -> AxesAttempt:
+        """A local optimum by Ipopt, from a start; ``rung``: one of `trajopt.model_pyomo.RUNGS`."""
+        since, model = perf_counter(), self._model
+        model.afresh()
+        if self._free is not None:
+            model.start(self._free, np.array([start.duration]))
+        _begin(self._setting, model, self._transcript, start)
+        outcome = model.run(rung, self._clock.left())
+        self._clock.charge("solve", since)
+        if outcome.claim is not Claim.OPTIMAL:
+            return AxesAttempt(outcome)
+        motion = _read(self._setting, model, self._transcript)
+        return AxesAttempt(outcome, motion, motion.objective)
 
 
 def _begin(setting: AxesSetting, model: Any, transcript: AxesTranscript, start: Guess) -> None:

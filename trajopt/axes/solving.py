@@ -11,7 +11,7 @@ import numpy as np
 
 from trajopt import checker
 from trajopt.attempt import Clock
-from trajopt.axes.attempt import AxesAttempt, on_mesh, run
+from trajopt.axes.attempt import AxesAttempt, AxesProgram, on_mesh
 from trajopt.axes.between import drawn_in, excess, restored
 from trajopt.axes.explain import explain, forward_only_speed
 from trajopt.axes.motion import Motion
@@ -30,7 +30,8 @@ from trajopt.verdict import Verdict
 
 _SAME: Final = 1e-4  # relative: coarse optima within it are one
 _ROUNDS: Final = 6  # of drawing in
-_REFINED: Final = 2  # how many of the distinct ones are refined
+_REFINED: Final = 2  # how many of the distinct ones are refined,
+_NEAR: Final = 0.25  # if they are no worse than the best by more than this share of it
 
 
 def solve(problem: AxesProblem, seconds: float | None = None) -> AxesSolution:
@@ -60,10 +61,10 @@ def _search(problem: AxesProblem, clock: Clock) -> tuple[list[AxesAttempt], list
     coarse = min(transcription.intervals, problem.search.intervals)
     if transcription.scheme == "euler" and isinstance(problem.release, float):
         coarse = transcription.intervals  # the release must fall on one of the equal steps
-    setting = on_mesh(AxesSetting.of(problem), coarse)
+    program = AxesProgram(on_mesh(AxesSetting.of(problem), coarse), clock)
     tried = []
     for guess in _shown(guesses(problem), problem.search.starts):
-        tried.append(run(setting, guess, clock))
+        tried.append(program.run(guess))
         if clock.over:
             break
     return tried, sorted((a for a in tried if a.motion is not None), key=lambda attempt: attempt.value)
@@ -72,13 +73,13 @@ def _search(problem: AxesProblem, clock: Clock) -> tuple[list[AxesAttempt], list
 def _refined(setting: AxesSetting, found: list[AxesAttempt], clock: Clock) -> AxesAttempt:
     """The best that becomes of coarse optima on the asked mesh, and once more from there, warm: where the objective is
     flat, other optima lie near."""
-    ends = [_run(setting, coarse, clock, "ipopt-adaptive") for coarse in found]
-    best = min(ends, key=_rank)
+    program, near = AxesProgram(setting, clock), [x for x in found if x.value <= (1 + _NEAR) * found[0].value]
+    best = min((_run(program, coarse, "ipopt-adaptive") for coarse in near), key=_rank)
     if best.motion is None:
-        best = min((_run(setting, coarse, clock, "ipopt") for coarse in found), key=_rank)
+        best = min((_run(program, coarse, "ipopt") for coarse in found), key=_rank)
     if best.motion is None or clock.over:
         return best
-    return min(best, _run(setting, best, clock, "ipopt-warm"), key=_rank)
+    return min(best, _run(program, best, "ipopt-warm"), key=_rank)
 
 
 def _kept(setting: AxesSetting, best: AxesAttempt, clock: Clock) -> AxesAttempt:
@@ -90,8 +91,8 @@ def _kept(setting: AxesSetting, best: AxesAttempt, clock: Clock) -> AxesAttempt:
         if over <= KEPT or clock.over:
             break
         share += 1.05 * over
-        tighter = drawn_in(setting, share)
-        ends = (_run(tighter, best, clock, rung) for rung in ("ipopt-warm", "ipopt"))
+        tighter = AxesProgram(drawn_in(setting, share), clock)
+        ends = (_run(tighter, best, rung) for rung in ("ipopt-warm", "ipopt"))
         inner = next((end for end in ends if end.motion is not None), None)
         if inner is None or inner.motion is None:
             break
@@ -100,9 +101,9 @@ def _kept(setting: AxesSetting, best: AxesAttempt, clock: Clock) -> AxesAttempt:
     return best
 
 
-def _run(setting: AxesSetting, start: AxesAttempt, clock: Clock, rung: str) -> AxesAttempt:
+def _run(program: AxesProgram, start: AxesAttempt, rung: str) -> AxesAttempt:
     assert start.motion is not None
-    return run(setting, Guess.from_motion(start.motion), clock, rung)
+    return program.run(Guess.from_motion(start.motion), rung)
 
 
 def _rank(attempt: AxesAttempt) -> float:
