@@ -33,7 +33,7 @@ class Claim(Enum):
 class Prices:
     """The multipliers of the rows of one side of a limit: ``at`` (n,) fractions of the duration, ``per_unit`` (n,) the
     change of the objective per SI unit by which the limit gives way there, ``own`` (n,) the limit itself (see
-    `trajopt.transcribe.profile`)."""
+    `own_size`)."""
 
     at: Floats
     per_unit: Floats

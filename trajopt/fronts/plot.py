@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from trajopt.fronts.front import outside
 from trajopt.mesh import Floats
-from trajopt.plots.trajectories import COLOURS, GREY, SHADE
+from trajopt.plots.look import COLOURS, GREY, SHADE, dress
 
 if TYPE_CHECKING:
     from trajopt.fronts.front import Front
@@ -87,11 +87,7 @@ def _pair(front: Front, axes: Axes, i: int, j: int) -> None:
     for k, label in ((i, axes.set_xlabel), (j, axes.set_ylabel)):
         unit = "" if front.units[k] == "1" else f" [{front.units[k]}]"
         label(f"{front.names[k]}{unit}", fontsize=9)
-    axes.grid(color="0.92", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8, color=GREY)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
 
 
 def _band(front: Front, axes: Axes) -> None:
@@ -123,9 +119,7 @@ def _strip(front: Front, axes: Axes) -> None:
     if front.asked is not None:
         axes.axhline(100 * front.asked, color=GREY, linewidth=0.9, linestyle=(0, (6, 3)))
     axes.set_ylabel("gap at most\n[%]", fontsize=8)
-    axes.tick_params(labelsize=8, color=GREY)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
+    dress(axes)
 
 
 def _inner(front: Front, points: Floats, x: Floats) -> Floats:
