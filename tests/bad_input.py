@@ -278,9 +278,9 @@ def _transcription() -> Iterator[Bad]:
         ("scheme", "exat", ("one of exact, euler", "did you mean 'exact'")),
         ("scheme", "Euler", ("one of exact, euler", "did you mean 'euler'")),
         ("scheme", "true", ("one of exact, euler",)),
-        ("solver", "ipop", ("auto, clarabel, osqp, ipopt", "did you mean 'ipopt'")),
-        ("solver", "gurobi", ("auto, clarabel, osqp, ipopt",)),
-        ("solver", "3", ("auto, clarabel, osqp, ipopt",)),
+        ("solver", "ipop", ("auto, piqp, clarabel, osqp, ipopt", "did you mean 'ipopt'")),
+        ("solver", "gurobi", ("auto, piqp, clarabel, osqp, ipopt",)),
+        ("solver", "3", ("auto, piqp, clarabel, osqp, ipopt",)),
     ):
         yield _set(f"{key}-{value}", f"transcription.{key}={value}", words=(f"transcription.{key}: unknown", *words))
 

@@ -58,7 +58,7 @@ def test_solve_for_people_names_units_solver_and_reason(move: Path) -> None:
     assert done.returncode == 0
     spent = {line.split()[0] for line in done.stdout.splitlines() if line.endswith(" %")}
     assert spent >= {"model", "solve", "bound", "check", "total"}
-    for word in ("SOLVED", "m/s^2", "clarabel", "convex", "checked independently", "+1 % time", "lower bound"):
+    for word in ("SOLVED", "m/s^2", "piqp", "convex", "checked independently", "+1 % time", "lower bound"):
         assert word in done.stdout
 
 

@@ -75,23 +75,26 @@ def convex(
     duration: float,
     goal: Goal,
     clock: Clock,
-    solver: str = "clarabel",
+    solver: str = "auto",
     widen: Sequence[str] = (),
     widen_size: float = 1.0,
     enough: float = ENOUGH,
+    step: bool = False,
 ) -> Attempt:
-    """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of settings until a
-    run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked certificate; each rung
-    has the sizes of the best move so far.
+    """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of solvers and their
+    settings until a run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked
+    certificate; each rung has the sizes of the best move so far. ``solver``: one rung, alone; a ``step`` on the
+    way needs no bound, so that a claim of the first one is believed.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
     from trajopt.model_cvxpy import LADDER, RESCUES, ConvexModel
 
+    rounding = max(1.0, setting.mesh.intervals / 1000)  # what a bound misses by grows with the rows
     best: Attempt | None = None
     stated: Sizes | None = None  # for which the model has been built
-    for rung in LADDER if solver == "clarabel" else (solver,):
+    for rung in _rungs(setting, solver):
         if rung in RESCUES and best is not None and best.gap <= 1e-6:
             break
         if stated is not setting.sizes:
@@ -102,13 +105,14 @@ def convex(
             lowered = goal(transcript)
             model.minimize(lowered.expression)
             clock.charge("model", since)
-        since = perf_counter()
-        outcome = model.run(rung, clock.left())
+        since, believed = perf_counter(), step and rung == LADDER[0]
+        outcome = model.run(rung, clock.left(), bounded=not believed)
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)
         again = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
-        if attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or again:
+        accepted = believed and outcome.claim is Claim.OPTIMAL
+        if accepted or attempt.gap <= enough * rounding or outcome.claim is Claim.INFEASIBLE or again:
             return attempt
         bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
@@ -120,6 +124,14 @@ def convex(
             setting = replace(setting, sizes=resized(setting.sizes, setting.problem, best.trajectory.chain))
     assert best is not None
     return best
+
+
+def _rungs(setting: Setting, solver: str) -> Sequence[str]:
+    from trajopt.model_cvxpy import LADDER
+
+    if solver != "auto":
+        return (solver,)
+    return [rung for rung in LADDER if setting.problem.transcription.solver != "clarabel" or rung != "piqp"]
 
 
 def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, widen: Sequence[str] = ()) -> Attempt:

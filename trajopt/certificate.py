@@ -49,7 +49,8 @@ def lower_bound(program: ConeProgram, x: Floats, z: Floats) -> float:
         return -np.inf
     reach = _reach(program, max(REACH, 10 * float(np.max(np.abs(x), initial=0.0))))
     z = _into_dual_cone(program, z)
-    best, unpaid, enough = *_bound(program, x, z, reach), _PAID * abs(program.value(x))
+    best, unpaid = _bound(program, x, z, reach)
+    enough = _PAID * max(1.0, len(x) / 4000) * abs(program.value(x))  # rounding adds up
     for ridge, moving in _WAYS:
         for y, w in _restored(program, x, z, ridge, moving) if not unpaid <= enough else ():
             bound, unpaid = _bound(program, y, w, reach)

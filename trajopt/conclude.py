@@ -32,6 +32,8 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
     InternalError when the lower bound lies above a checked answer.
     """
     problem, outcome = setting.problem, attempt.outcome
+    if outcome.solver and chosen.model == "cvxpy":
+        chosen = replace(chosen, solver=outcome.solver)
     if attempt.trajectory is None:
         return _unsolved(setting, chosen, attempt, clock)
     trajectory = replace(attempt.trajectory, problem=problem)

@@ -49,7 +49,7 @@ def descend(setting: Setting, start: Trajectory, clock: Clock) -> Attempt:
     here, penalty = start, 0.0
     attempt = Attempt(Outcome(Claim.FAILED, "no step"))
     for step in range(_STEPS):
-        attempt = convex(replace(setting, quantities=_linearised_at(here)), duration, to(objective), clock)
+        attempt = convex(replace(setting, quantities=_linearised_at(here)), duration, to(objective), clock, step=True)
         if attempt.trajectory is None:
             return attempt
         penalty = max(penalty, _penalty(attempt))

@@ -432,7 +432,7 @@ class Transcription(Section):
 
     intervals: Annotated[int, BeforeValidator(_intervals)] = 200
     scheme: Literal["exact", "euler"] = "exact"
-    solver: Literal["auto", "clarabel", "osqp", "ipopt"] = "auto"
+    solver: Literal["auto", "piqp", "clarabel", "osqp", "ipopt"] = "auto"
     min_dwell: Annotated[float, nonnegative("time")] = 0.0
     touches: Annotated[int | None, BeforeValidator(_touches)] = None
     tighten: Annotated[bool, Field(strict=True)] = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from trajopt.errors import BadInput
 from trajopt.problem import FREE, Problem
@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from trajopt.axes.problem import AxesProblem
     from trajopt.plant.problem import PlantProblem
 
+ALONE: Final = ("piqp", "osqp")  # solvers that, asked for by name, have no other one behind them
+
 
 @dataclass(frozen=True)
 class Route:
-    """``model``: cvxpy, pyomo, or arcs without one; ``solver``: clarabel, osqp, ipopt, or newton on switching times;
-    ``reason``: one line for people."""
+    """``model``: cvxpy, pyomo, or arcs without one; ``solver``: piqp, clarabel, osqp, ipopt, or newton on switching
+    times, as expected, and on a solution the one whose answer it is; ``reason``: one line for people."""
 
     model: str
     solver: str
@@ -68,14 +70,18 @@ def route_on_mesh(problem: Problem) -> Route:
             "pyomo", "ipopt", "asked for" + (f"; {hindrance}" if hindrance else ", though the problem is convex")
         )
     if hindrance and has_power_bound(problem) and wanted in ("auto", "clarabel"):
-        return Route("cvxpy", "clarabel", f"{hindrance}; bounded by a cone program, then sequential convex programs")
+        why = f"{hindrance}; bounded by a cone program (clarabel), then sequential convex programs"
+        return Route("cvxpy", "piqp" if wanted == "auto" else wanted, why)
     if hindrance:
         if wanted != "auto":
             raise BadInput(f'transcription.solver = {wanted!r} takes convex problems only: {hindrance}; use "ipopt"')
         return Route("pyomo", "ipopt", hindrance)
-    if wanted == "osqp" and (obstacle := _not_quadratic(problem)):
-        raise BadInput(f'transcription.solver = "osqp" takes linear and quadratic programs only: {obstacle}')
-    solver = "clarabel" if wanted == "auto" else wanted
+    obstacle = _not_quadratic(problem)
+    if wanted in ALONE:
+        obstacle = obstacle or ("a search over the time may need others" if problem.move.fixed_time is None else "")
+        if obstacle:
+            raise BadInput(f'transcription.solver = "{wanted}" takes linear and quadratic programs only: {obstacle}')
+    solver = wanted if wanted != "auto" else "clarabel" if obstacle else "piqp"
     return Route("cvxpy", solver, _convex_reason(problem))
 
 
@@ -143,8 +149,6 @@ def _product(problem: Problem, name: str) -> str:
 
 
 def _not_quadratic(problem: Problem) -> str:
-    if problem.move.fixed_time is None:
-        return "the search over the time is Clarabel's"
     if problem.limits.rms_force is not None:
         return "an RMS limit is a second-order cone"
     norms_used = [term.norm for term in problem.objective.terms if term.norm]

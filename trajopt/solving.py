@@ -18,7 +18,7 @@ from trajopt.power import descend, linearised, relax
 from trajopt.prices import prices
 from trajopt.problem import Objective, Problem, Term
 from trajopt.quantities import is_affine
-from trajopt.routing import Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
+from trajopt.routing import ALONE, Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
 from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
 from trajopt.switching_times import as_chain, fastest, floor, forwards
@@ -155,7 +155,8 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     """One convex program, and a second one where it leaves a tie."""
     duration = setting.problem.move.fixed_time
     assert duration is not None
-    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, chosen.solver), clock)
+    solver = chosen.solver if setting.problem.transcription.solver in ALONE else "auto"
+    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock)
     return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
 
 
@@ -164,7 +165,7 @@ def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Cloc
     with the limits drawn in a little, and what the rungs make of it that were not needed."""
     yield break_tie(lean, first, chosen, clock)
     yield first, chosen
-    if first.trajectory is None or chosen.solver != "clarabel":
+    if first.trajectory is None or lean.problem.transcription.solver in ALONE:
         return
     inner = convex(drawn_in(lean, _DRAWN), first.trajectory.duration, to(lean.problem.objective), clock)
     if inner.trajectory is not None:

@@ -14,45 +14,53 @@ from trajopt.routing import Route
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript
 
-_ENOUGH: Final = 1e-8  # gap of the second solve, whose value nobody is told
-HELD: Final = (1e-9, 1e-8)  # relative: how closely the second solve holds the optimum; the first that it can
+_WEIGHTS: Final = (1e-5, 1e-7, 1e-9)  # of smoothness, relative, in the second solve; the first that costs nothing
+_COST: Final = 2e-9  # relative: what counts as nothing
 
 
 def break_tie(setting: Setting, attempt: Attempt, chosen: Route, clock: Clock) -> tuple[Attempt, Route]:
-    """The smoothest of the optima, the same on every machine, where the profile is not determined; else the attempt."""
+    """The smoothest of the optima, the same on every machine, where the profile is not determined; else the attempt.
+
+    Beside an objective that is linear in disguise a small enough weight changes nothing but which optimum is found
+    (Mangasarian & Meyer 1979); beside a curved one it costs the square of the weight. To hold the optimum by a row
+    instead leaves a set without interior, in which solvers stall.
+    """
     if attempt.trajectory is None:
         return attempt, chosen
     if _determines_profile(setting.problem):
         return attempt, replace(chosen, unique=True)
-    for share in HELD:
-        second = _smoothest_optimum(setting, attempt, share, clock)
-        if second.trajectory is not None and _costs_no_more(setting, second.trajectory, attempt, 2 * share):
-            tied = replace(attempt, trajectory=second.trajectory, notes=attempt.notes | {"held": share})
+    for weight in _WEIGHTS:
+        second = _with_smoothness(setting, attempt, weight, clock)
+        if second.trajectory is not None and _costs_nothing(setting, second.trajectory, attempt):
+            tied = replace(attempt, trajectory=second.trajectory, notes=attempt.notes | {"held": _COST})
             label = " + ".join(term.label for term in setting.problem.objective.terms)
             return tied, tied_route(chosen, setting, attempt, tied, label)
+        if clock.over:
+            break
     return attempt, chosen
 
 
-def _smoothest_optimum(setting: Setting, attempt: Attempt, share: float, clock: Clock) -> Attempt:
-    """The smoothest move whose objective exceeds the attempt's by at most a share of it."""
+def _with_smoothness(setting: Setting, attempt: Attempt, weight: float, clock: Clock) -> Attempt:
+    """The least of the objective and, with that weight, of its smoothness, both over what they are in the attempt."""
     objective, smooth = setting.problem.objective, smoothest(setting.problem)
     assert attempt.trajectory is not None
+    roughness = attempt.trajectory.measure(smooth)
 
     def goal(transcript: Transcript) -> Lowered:
-        held = lower(transcript, objective)
-        best = held.expression_value(attempt.value)
-        transcript.model.nonpositive(held.expression - best - share * max(abs(best), 1e-3))
-        return lower(transcript, smooth)
+        cost, rough = lower(transcript, objective), lower(transcript, smooth)
+        best = max(abs(cost.expression_value(attempt.value)), 1e-3)
+        size = max(rough.expression_value(roughness), 1e-9)
+        return Lowered(cost.expression * (1 / best) + rough.expression * (weight / size), 1.0, None)
 
-    return convex(setting, attempt.trajectory.duration, goal, clock, enough=_ENOUGH)
+    return convex(setting, attempt.trajectory.duration, goal, clock, step=True)
 
 
-def _costs_no_more(setting: Setting, trajectory: Trajectory, attempt: Attempt, share: float) -> bool:
-    """Whether a smoother profile holds the true objective: solvers may not, nor may a linearised power."""
+def _costs_nothing(setting: Setting, trajectory: Trajectory, attempt: Attempt) -> bool:
+    """Whether a smoother profile holds the true objective: its weight, or a linearised power, may be too much."""
     assert attempt.trajectory is not None
     objective = setting.problem.objective
     best = min(attempt.value, attempt.trajectory.measure(objective))
-    return trajectory.measure(objective) <= best + share * max(abs(best), 1e-3 * attempt.size)
+    return trajectory.measure(objective) <= best + _COST * max(abs(best), 1e-3 * attempt.size)
 
 
 def _determines_profile(problem: Problem) -> bool:

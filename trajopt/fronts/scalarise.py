@@ -16,11 +16,11 @@ from trajopt.power import relax
 from trajopt.problem import DERIVATIVES, FREE, Ceiling, Objective, Problem, Term
 from trajopt.routing import has_power_bound, nonaffine_limits, route_on_mesh
 from trajopt.solution import Solution
-from trajopt.ties import HELD
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, without
 
 _OURS: Final = ("l1", "l2", "linf")
+_HELD: Final = (1e-9, 1e-8)  # relative: how closely an end of a front holds what came before; the first that it can
 _INERTIAL: Final = {"force", "power", "energy", "current", "envelope", "rms_force"}
 
 
@@ -108,7 +108,7 @@ def _anchor(task: Task) -> Answer:
         values = measured(solution, task.terms)
         if values is None or solution.route.unique or min(values[i] for i in order[:k]) <= 0:
             break
-        for share in HELD if solution.route.model == "cvxpy" else (1e-7,):
+        for share in _HELD if solution.route.model == "cvxpy" else (1e-7,):
             held = [_ceiling(task.terms[i], values[i] * (1 + share)) for i in order[:k]]
             second = _solve(task, [term], held)
             if second.status.solved:
