@@ -16,7 +16,7 @@ from trajopt.problem import DERIVATIVES, Objective, Problem, Term
 from trajopt.rebuild import rebuild
 from trajopt.scaling import Sizes, resized
 from trajopt.trajectory import Trajectory
-from trajopt.transcribe import Setting, Transcript, transcribe
+from trajopt.transcribe import Setting, Transcript, transcribe, transcribe_again
 
 ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
 
@@ -100,13 +100,17 @@ def convex(
         if stated is not setting.sizes:
             since, stated = perf_counter(), setting.sizes
             model = ConvexModel()
-            by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
-            transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
+            if widen:
+                by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0]
+                transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
+            else:
+                transcript = transcribe_again(setting, model, duration)
+                model = transcript.model
             lowered = goal(transcript)
             model.minimize(lowered.expression)
             clock.charge("model", since)
         since, believed = perf_counter(), step and rung == LADDER[0]
-        outcome = model.run(rung, clock.left(), bounded=not believed)
+        outcome = model.run(rung, clock.left(), np.inf if believed else enough * rounding)
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)

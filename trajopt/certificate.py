@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 
 Floats = NDArray[np.float64]
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
-_PAID: Final = 1e-9  # of the value: what inexact stationarity may take off a bound without being mended
+_PAID: Final = 1e-12  # of the value: what inexact stationarity may take off a bound without being mended
 _WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-16, 1e-17)))  # of `_restored`
 
 
@@ -43,19 +43,22 @@ class ConeProgram:
         return float(0.5 * x @ (self.P @ x) + self.q @ x)
 
 
-def lower_bound(program: ConeProgram, x: Floats, z: Floats) -> float:
-    """A lower bound on the optimal value from a primal and a dual vector, both possibly inexact; -inf if not finite."""
+def lower_bound(program: ConeProgram, x: Floats, z: Floats, wanted: float = np.inf) -> float:
+    """A lower bound on the optimal value from a primal and a dual vector, both possibly inexact; -inf if not finite.
+    A better one than ``wanted`` is not looked for."""
     if not (np.all(np.isfinite(x)) and np.all(np.isfinite(z))):
         return -np.inf
     reach = _reach(program, max(REACH, 10 * float(np.max(np.abs(x), initial=0.0))))
     z = _into_dual_cone(program, z)
     best, unpaid = _bound(program, x, z, reach)
-    enough = _PAID * max(1.0, len(x) / 4000) * abs(program.value(x))  # rounding adds up
+    enough = _PAID * abs(program.value(x))
     for ridge, moving in _WAYS:
-        for y, w in _restored(program, x, z, ridge, moving) if not unpaid <= enough else ():
+        if unpaid <= enough or best > wanted:
+            break
+        for y, w in _restored(program, x, z, ridge, moving):
             bound, unpaid = _bound(program, y, w, reach)
             best = max(best, bound)
-            if unpaid <= enough:
+            if unpaid <= enough or best > wanted:
                 break
     return best
 
@@ -142,6 +145,8 @@ def _restored(
         right = -np.concatenate([program.P @ x + program.q + program.A.T @ z, np.zeros(len(rows))])
         step = factors.solve(right)
         step += factors.solve(right - K @ step)
+        if not np.max(np.abs(step)) < 1e100:  # nearly singular: nothing is restored
+            return
         x = x + step[:n] if moving else x
         change = np.zeros(len(z))
         change[rows] = step[n:]

@@ -30,6 +30,14 @@ class Lowered:
         unit = self.norm.value_alone(1.0)
         return self.scale / unit * self.norm.value_alone(value) if np.isfinite(value) else value
 
+    def over(self, si: float) -> Lowered:
+        """The same objective, with an expression that is one where the SI objective has this value."""
+        size = abs(self.expression_value(si))
+        if not size:
+            return self
+        unit = size if self.norm is None else self.norm.value_alone(size) / self.norm.value_alone(1.0)
+        return Lowered(self.expression * (1 / size), self.scale * unit, self.norm)
+
     def slope(self, value: float) -> float:
         """The derivative of `si`."""
         step = 1e-6 * max(abs(value), 1e-12)

@@ -39,7 +39,7 @@ def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
     _rows(setting, duration, model, by)
     model.minimize(by)
     for rung in LADDER:
-        outcome = model.run(rung, clock.left())
+        outcome = model.run(rung, clock.left(), above=_CERTAIN)
         if outcome.claim is Claim.INFEASIBLE or outcome.bound > _CERTAIN:
             return True
         if outcome.claim is Claim.OPTIMAL:

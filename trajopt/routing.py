@@ -76,7 +76,7 @@ def route_on_mesh(problem: Problem) -> Route:
         if wanted != "auto":
             raise BadInput(f'transcription.solver = {wanted!r} takes convex problems only: {hindrance}; use "ipopt"')
         return Route("pyomo", "ipopt", hindrance)
-    obstacle = _not_quadratic(problem)
+    obstacle = beyond_quadratic(problem)
     if wanted in ALONE:
         obstacle = obstacle or ("a search over the time may need others" if problem.move.fixed_time is None else "")
         if obstacle:
@@ -148,7 +148,8 @@ def _product(problem: Problem, name: str) -> str:
     return "friction changes sign with the velocity" if name in FORCES else "a product of force and velocity"
 
 
-def _not_quadratic(problem: Problem) -> str:
+def beyond_quadratic(problem: Problem) -> str:
+    """What of a problem, beside its power, takes more than a quadratic program; or nothing."""
     if problem.limits.rms_force is not None:
         return "an RMS limit is a second-order cone"
     norms_used = [term.norm for term in problem.objective.terms if term.norm]

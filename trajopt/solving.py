@@ -14,7 +14,7 @@ from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import findings
 from trajopt.explain import explain_power, tested
 from trajopt.model import Claim, Outcome
-from trajopt.power import descend, linearised, relax
+from trajopt.power import linearised, optimum, relax
 from trajopt.prices import prices
 from trajopt.problem import Objective, Problem, Term
 from trajopt.quantities import is_affine
@@ -211,10 +211,9 @@ def _shortest_candidates(
 
 def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
     """Power or energy: the bound of the relaxation, and from its answer a descent by convex programs, or by Ipopt."""
-    relaxed = relax(lean, clock)
+    relaxed, answer = optimum(lean, clock)
     if relaxed.trajectory is None:
         return conclude(setting, chosen, relaxed, clock), relaxed
-    answer = descend(lean, relaxed.trajectory, clock)
     candidates = []
     if answer.trajectory is None:
         chosen = Route("pyomo", "ipopt", f"{answer.outcome.raw_status}; Ipopt from the relaxation's answer")

@@ -33,6 +33,7 @@ class Setting:
     scheme: Scheme
     sizes: Sizes
     quantities: Callable[..., Quantities] = Quantities  # makes force and power from the chain; a relaxation has its own
+    laid: dict[Any, Transcript] = field(default_factory=dict, compare=False, repr=False)  # see `transcribe_again`
 
     @classmethod
     def of(cls, problem: Problem) -> Setting:
@@ -42,6 +43,7 @@ class Setting:
 
 def without(setting: Setting, names: Sequence[str]) -> Setting:
     """The setting without some limits."""
+    names = [name for name in names if getattr(setting.problem.limits, name) is not None]
     if not names:
         return setting
     limits = setting.problem.limits.model_copy(update=dict.fromkeys(names))
@@ -103,6 +105,21 @@ def transcribe(setting: Setting, model: Any, duration: Any, widen: Mapping[str, 
     transcript = lay(setting, model, duration, widen=widen)
     hold(transcript)
     return transcript
+
+
+def transcribe_again(setting: Setting, empty: Any, duration: float) -> Transcript:
+    """`transcribe`, of which the programs of one solve share what they have in common: rows that are kinematic alone
+    are laid once, on the ``empty`` model, and copied."""
+    problem = setting.problem
+    if problem.vibration or not problem.limits.given().keys() <= set(DERIVATIVES):
+        return transcribe(setting, empty, duration)
+    key = (id(problem), id(setting.mesh), id(setting.sizes), duration)  # of what the transcript keeps alive
+    if key not in setting.laid:
+        setting.laid[key] = transcribe(replace(setting, quantities=Quantities), empty, duration)
+    laid = setting.laid[key]
+    model, known = laid.model.copied(), laid.quantities
+    own = setting.quantities(problem, model, known.scheme, known.mesh, known.sizes, known.chain, known.steps)
+    return replace(laid, model=model, quantities=own)
 
 
 def lay(

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf, isfinite, sqrt
+from math import exp, inf, isfinite, sqrt
 
 from scipy.optimize import brentq
 
 from trajopt.velocity_domain.axis import Axis
+from trajopt.velocity_domain.roots import common_root
 
 
 @dataclass(frozen=True)
@@ -51,12 +52,32 @@ def least_peak(axis: Axis) -> float:
 def least_peak_power(axis: Axis) -> PowerOptimum:
     """The least possible peak of |m a v|. Raises as ``least_energy``."""
     low = least_peak(axis)
+    if (found := _at_once(axis, low)) is not None:
+        return found
 
     def surplus(v: float) -> float:
         return axis.quickest(v, power_at(axis, v))[0] - axis.duration
 
     peak = rising_root(surplus, low * (1 + 1e-9), axis.velocity)
     return PowerOptimum(power_at(axis, peak), peak, axis.mass * peak**2)
+
+
+def _at_once(axis: Axis, low: float) -> PowerOptimum | None:
+    """The least peak power without a stay, by peak speed and power at once; None where that finds nothing."""
+    mean = axis.distance / axis.duration
+    natural = axis.mass * mean**2 / axis.duration
+
+    def misses(x: float, z: float) -> tuple[float, float]:
+        if not (low < x * mean < axis.velocity and abs(z) < 60):
+            return inf, inf
+        time, lag = axis.quickest(x * mean, natural * exp(z))
+        return time / axis.duration - 1, lag / (axis.distance * (x - 1)) - 1
+
+    found = common_root(misses, (1.5, 1.0))
+    if found is None:
+        return None
+    peak, power = float(found[0]) * mean, natural * exp(found[1])
+    return PowerOptimum(power, peak, axis.mass * peak**2)
 
 
 def power_within(axis: Axis, energy: float) -> PowerOptimum:

@@ -1,14 +1,16 @@
-"""Roots of many increasing functions at once."""
+"""Roots of many increasing functions at once, and of two functions of two unknowns."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import root
 
 from trajopt.velocity_domain.motor import Floats
 
 _ROUNDS = 80
+_MET = 1e-10
 _SETTLED = 1e-10  # relative: a Newton step this small leaves an error of its square
 
 
@@ -30,3 +32,15 @@ def increasing_root(function: Callable[[Floats], tuple[Floats, Floats]], top: Fl
         value, slope = function(x)
         step = x - value / slope
     return np.where((step >= low) & (step <= high), step, x)
+
+
+def common_root(functions: Callable[[float, float], tuple[float, float]], start: tuple[float, float]) -> Floats | None:
+    """(2,) where two functions of size one vanish together, near a start; None if they are not found to. Much faster
+    than a search within a search, which stays for those cases. Infinite values keep unknowns within their range."""
+
+    def values(x: Floats) -> tuple[float, float]:
+        return functions(float(x[0]), float(x[1]))
+
+    with np.errstate(invalid="ignore", over="ignore"):
+        found: Floats = root(values, start, tol=1e-11).x
+        return found if np.max(np.abs(values(found))) <= _MET else None

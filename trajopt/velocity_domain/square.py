@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, isfinite, log, sqrt
+from math import exp, inf, isfinite, log, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from trajopt.velocity_domain.axis import Axis, between, over_speed, pieces
 from trajopt.velocity_domain.motor import Floats
 from trajopt.velocity_domain.power import least_peak, rising_root
+from trajopt.velocity_domain.roots import common_root
 
 
 @dataclass(frozen=True)
@@ -34,31 +35,48 @@ def least_square_power(axis: Axis) -> SquareOptimum:
     low = least_peak(axis)
 
     def surplus(peak: float) -> float:
-        return sum(ramp.extent[0] for ramp in _ramps(axis, peak)) - axis.duration
+        return sum(ramp.extent[0] for ramp in _priced(axis, peak)) - axis.duration
 
-    peak = rising_root(surplus, low * (1 + 1e-9), axis.velocity)
-    value = sum(ramp.cost() for ramp in _ramps(axis, peak))
-    return SquareOptimum(value, peak, axis.mass * peak**2)
+    ramps = _at_once(axis, low) or _priced(axis, rising_root(surplus, low * (1 + 1e-9), axis.velocity))
+    peak = ramps[0].peak
+    return SquareOptimum(sum(ramp.cost() for ramp in ramps), peak, axis.mass * peak**2)
 
 
-def _ramps(axis: Axis, peak: float) -> list[_Ramp]:
+def _at_once(axis: Axis, low: float) -> list[_Ramp]:
+    """The two ramps without a stay, by peak speed and price at once; empty where that finds nothing."""
+    mean = axis.distance / axis.duration
+    natural = axis.mass**2 * mean**3 / axis.duration**2
+
+    def misses(x: float, z: float) -> tuple[float, float]:
+        if not (low < x * mean < axis.velocity and abs(z) < 60):
+            return inf, inf
+        times, lags = zip(*(ramp.extent for ramp in _ramps(axis, x * mean, natural * exp(z))), strict=True)
+        return sum(times) / axis.duration - 1, sum(lags) / (axis.distance * (x - 1)) - 1
+
+    found = common_root(misses, (1.4, 3.0))
+    return [] if found is None else _ramps(axis, float(found[0]) * mean, natural * exp(found[1]))
+
+
+def _ramps(axis: Axis, peak: float, price: float) -> list[_Ramp]:
+    up, down = axis.ramps
+    first = _Ramp(axis.mass, axis.jerk, up, peak, price)
+    return [first, first if down == up else replace(first, acceleration=down)]
+
+
+def _priced(axis: Axis, peak: float) -> list[_Ramp]:
     """The two ramps to a peak speed with which, and with a stay there, the end is reached in time."""
     target = peak * axis.duration - axis.distance
 
-    def ramps(z: float) -> list[_Ramp]:
-        up, down = axis.ramps
-        first = _Ramp(axis.mass, axis.jerk, up, peak, exp(z))
-        return [first, first if down == up else replace(first, acceleration=down)]
-
     def excess(z: float) -> float:
-        return log(sum(ramp.extent[1] for ramp in ramps(z)) / target)
+        return log(sum(ramp.extent[1] for ramp in _ramps(axis, peak, exp(z))) / target)
 
     low = high = log(axis.mass**2 * peak**3 / axis.duration**2)
     while excess(high) > 0 and high < low + 60:
         high += 2
     while excess(low) < 0:
         low -= 2
-    return ramps(high if excess(high) > 0 else float(brentq(excess, low, high, xtol=1e-14, rtol=1e-14)))
+    z = high if excess(high) > 0 else float(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
+    return _ramps(axis, peak, exp(z))
 
 
 @dataclass(frozen=True)
