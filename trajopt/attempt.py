@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 import norms
+from trajopt.mesh import Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Objective, Problem, Term
@@ -89,9 +90,9 @@ def convex(
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
-    from trajopt.model_cvxpy import LADDER, RESCUES, ConvexModel
+    from trajopt.model_cvxpy import QUADRATIC, RESCUES, ConvexModel
 
-    rounding = max(1.0, setting.mesh.intervals / 1000)  # what a bound misses by grows with the rows
+    enough *= rounding(setting.mesh)
     best: Attempt | None = None
     stated: Sizes | None = None  # for which the model has been built
     for rung in _rungs(setting, solver):
@@ -109,14 +110,14 @@ def convex(
             lowered = goal(transcript)
             model.minimize(lowered.expression)
             clock.charge("model", since)
-        since, believed = perf_counter(), step and rung == LADDER[0]
-        outcome = model.run(rung, clock.left(), np.inf if believed else enough * rounding)
+        since, believed = perf_counter(), step and rung in QUADRATIC
+        outcome = model.run(rung, clock.left(), np.inf if believed else enough)
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
         attempt = _read(setting, transcript, lowered, outcome)
         again = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
         accepted = believed and outcome.claim is Claim.OPTIMAL
-        if accepted or attempt.gap <= enough * rounding or outcome.claim is Claim.INFEASIBLE or again:
+        if accepted or attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or again:
             return attempt
         bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
@@ -130,12 +131,19 @@ def convex(
     return best
 
 
-def _rungs(setting: Setting, solver: str) -> Sequence[str]:
-    from trajopt.model_cvxpy import LADDER
+def rounding(mesh: Mesh) -> float:
+    """By how much more than on a small mesh a solver may miss an optimum: rounding grows with the rows."""
+    return max(1.0, mesh.intervals / 1000)
 
+
+def _rungs(setting: Setting, solver: str) -> Sequence[str]:
+    from trajopt.model_cvxpy import LADDER, LARGE, QUADRATIC
+
+    large = setting.mesh.intervals > LARGE
     if solver != "auto":
-        return (solver,)
-    return [rung for rung in LADDER if setting.problem.transcription.solver != "clarabel" or rung != "piqp"]
+        return (QUADRATIC[1] if large and solver == QUADRATIC[0] else solver,)
+    passed = QUADRATIC if setting.problem.transcription.solver == "clarabel" else QUADRATIC[:1] if large else ()
+    return [rung for rung in LADDER if rung not in passed]
 
 
 def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, widen: Sequence[str] = ()) -> Attempt:
@@ -174,19 +182,18 @@ def free_duration(setting: Setting, model: Any, start: float) -> Any:
 
 def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:
     """The Lagrangian, at the attempt's primal and dual vector, of its program with another duration."""
-    model: Any
+    assert attempt.outcome.pair is not None and attempt.trajectory is not None
+    setting = replace(setting, sizes=attempt.trajectory.sizes)
     if attempt.convex:
         from trajopt.model_cvxpy import ConvexModel
 
-        model = ConvexModel()
+        transcript = transcribe_again(setting, ConvexModel(), duration)
     else:
         from trajopt.model_pyomo import NonconvexModel
 
-        model = NonconvexModel()
-    assert attempt.outcome.pair is not None and attempt.trajectory is not None
-    transcript = transcribe(replace(setting, sizes=attempt.trajectory.sizes), model, duration)
-    model.minimize(goal(transcript).expression)
-    return float(model.lagrangian(attempt.outcome.pair))
+        transcript = transcribe(setting, NonconvexModel(), duration)
+    transcript.model.minimize(goal(transcript).expression)
+    return float(transcript.model.lagrangian(attempt.outcome.pair))
 
 
 def _read(setting: Setting, transcript: Transcript, lowered: Lowered, outcome: Outcome) -> Attempt:

@@ -16,7 +16,7 @@ from trajopt.attempt import Attempt, Goal, lagrangian
 from trajopt.problem import Problem
 from trajopt.transcribe import Setting
 
-_STEP: Final = 1e-4  # of the duration, for the central difference of the Lagrangian
+_STEP: Final = 1e-6  # of the duration, for the difference of the Lagrangian, which is smooth
 
 
 def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float) -> list[dict[str, Any]]:
@@ -66,8 +66,8 @@ def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> fl
         return None
     if any(limit.varies for limit in problem.limits.given().values()):
         return None
-    later, sooner = (lagrangian(setting, duration * (1 + s), goal, attempt) for s in (_STEP, -_STEP))
-    return attempt.slope * (later - sooner) / (2 * _STEP * duration)
+    now, later = (lagrangian(setting, duration * (1 + s), goal, attempt) for s in (0.0, _STEP))
+    return attempt.slope * (later - now) / (_STEP * duration)
 
 
 def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from trajopt.attempt import Attempt, Clock, convex, smoothest
+from trajopt.attempt import Attempt, Clock, convex, rounding, smoothest
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.routing import Route
@@ -32,7 +32,7 @@ def break_tie(setting: Setting, attempt: Attempt, chosen: Route, clock: Clock) -
     for weight in _WEIGHTS:
         second = _with_smoothness(setting, attempt, weight, clock)
         if second.trajectory is not None and _costs_nothing(setting, second.trajectory, attempt):
-            tied = replace(attempt, trajectory=second.trajectory, notes=attempt.notes | {"held": _COST})
+            tied = replace(attempt, trajectory=second.trajectory, notes=attempt.notes | {"held": _COST * rounding(setting.mesh)})
             label = " + ".join(term.label for term in setting.problem.objective.terms)
             return tied, tied_route(chosen, setting, attempt, tied, label)
         if clock.over:
@@ -60,7 +60,7 @@ def _costs_nothing(setting: Setting, trajectory: Trajectory, attempt: Attempt) -
     assert attempt.trajectory is not None
     objective = setting.problem.objective
     best = min(attempt.value, attempt.trajectory.measure(objective))
-    return trajectory.measure(objective) <= best + _COST * max(abs(best), 1e-3 * attempt.size)
+    return trajectory.measure(objective) <= best + _COST * rounding(setting.mesh) * max(abs(best), 1e-3 * attempt.size)
 
 
 def _determines_profile(problem: Problem) -> bool:
