@@ -57,7 +57,7 @@ class Attempt:
     value: float = np.nan
     bound: float = -np.inf
     slope: float = np.nan  # SI objective per unit of the program's
-    notes: dict[str, Any] = field(default_factory=dict)  # prices; starts and agreed; held by a tie-break; programs
+    notes: dict[str, Any] = field(default_factory=dict)  # prices; starts and agreed; programs
     size: float = 1.0  # of the objective, SI
     forgiven: float = 0.0  # see `trajopt.model.Outcome.forgiven`; SI
     convex: bool = True

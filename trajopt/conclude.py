@@ -38,8 +38,6 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
         return _unsolved(setting, chosen, attempt, clock)
     trajectory = replace(attempt.trajectory, problem=problem)
     value = trajectory.measure(problem.objective)
-    if "held" in attempt.notes:  # the optimum itself, which the smoother profile holds within that share
-        value = attempt.value
     certificate = _certificate(setting, value, attempt)
     verdict = Verdict.SOLVED if certificate["gap"] is not None and certificate["gap"] <= GAP else Verdict.SOLVED_LOCAL
     found = metrics(trajectory)

@@ -39,7 +39,7 @@ from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, prescribed, without
 
 _STEPS: Final = 30
-_ENOUGH: Final = 1e-8  # relative: a smaller gain ends the descent; so does a program whose value was as it foretold
+_ENOUGH: Final = 1e-9  # relative: a smaller gain ends the descent; so does a program whose value was as it foretold
 _TIGHT: Final = 5e-9  # relative gap of the relaxation: it lies further below every move than that
 _TOUCHING: Final = 1e-7  # and with tangents
 _HUMP: Final = 0.75  # of a parabola of velocity, the rest is steady: measured, a program less than with either
@@ -123,7 +123,7 @@ def _guess(setting: Setting) -> Trajectory:
     first, last = (state.fixed(problem.order)[1] for state in (move.start, move.end))
     assert isinstance(move.end.position, float) and duration is not None
     origin = move.start_position or 0.0
-    steady = all(term.minimize == "energy" for term in problem.objective.terms)
+    steady = {term.label for term in problem.objective.terms} <= {"energy", "power l1"}
     missing = (move.end.position - origin) / duration - (first + last) / 2
     hump = 0.0 if steady else 6 * _HUMP * missing
     start = np.array([0.0, first + missing - hump / 6, (last - first + hump) / duration])

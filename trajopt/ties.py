@@ -32,7 +32,7 @@ def break_tie(setting: Setting, attempt: Attempt, chosen: Route, clock: Clock) -
     for weight in _WEIGHTS:
         second = _with_smoothness(setting, attempt, weight, clock)
         if second.trajectory is not None and _costs_nothing(setting, second.trajectory, attempt):
-            tied = replace(attempt, trajectory=second.trajectory, notes=attempt.notes | {"held": _COST * rounding(setting.mesh)})
+            tied = replace(attempt, trajectory=second.trajectory)
             label = " + ".join(term.label for term in setting.problem.objective.terms)
             return tied, tied_route(chosen, setting, attempt, tied, label)
         if clock.over:
