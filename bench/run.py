@@ -49,14 +49,14 @@ class Plan:
     """How much is run: the mesh sizes of each group and the runs of each side, on small and on large meshes."""
 
     small: int
-    large: int
+    sizes: tuple[int, ...]  # of cold solves against a peer
     growth: tuple[int, ...]
     runs: int
     few: int
 
 
-FULL: Final = Plan(200, 5000, (1000, 5000, 20_000, 100_000), 9, 1)
-SMOKE: Final = Plan(20, 24, (20, 40), 1, 1)
+FULL: Final = Plan(200, (50, 200, 1000, 5000), (1000, 5000, 20_000, 100_000), 9, 1)
+SMOKE: Final = Plan(20, (20, 24), (20, 40), 1, 1)
 
 
 def compared(
@@ -112,12 +112,11 @@ def single(plan: Plan, convex: bool) -> Iterator[Row]:
     """Cold solves and re-solves at other distances against Opti, and against the bare Clarabel runs within ours."""
     group = "convex" if convex else "power"
     for case in (case for case in CASES.values() if case.convex is convex):
-        for n in (plan.small, plan.large):
-            runs = plan.runs if n == plan.small else plan.few
-            problem = case.problem(n)
+        for n in plan.sizes:
+            runs, problem = plan.runs if n <= plan.small else plan.few, case.problem(n)
             row = Row(group, f"{case.name}, cold", n, "CasADi Opti, Ipopt")
             yield compared(row, partial(ours, problem), partial(casadi_opti.cold, case, n), runs)
-            if n == plan.large:
+            if n != plan.small:
                 continue
             yield _again(group, case, n, runs)
             bare = bare_clarabel.alone(problem)

@@ -116,8 +116,8 @@ def _between_tangents(setting: Setting, clock: Clock) -> tuple[Attempt, Attempt]
 
 
 def _guess(setting: Setting) -> Trajectory:
-    """What the power is linearised at first: between the gentlest move and, to which its energy is linear, a steady one;
-    it need not keep states and limits."""
+    """What the power is linearised at first: a move between the gentlest one and a steady one, at which energy is
+    linear. It need not keep states and limits."""
     problem, mesh = setting.problem, setting.mesh
     move, duration = problem.move, problem.move.fixed_time
     first, last = (state.fixed(problem.order)[1] for state in (move.start, move.end))

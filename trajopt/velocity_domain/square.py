@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, inf, isfinite, log, sqrt
+from math import acos, asinh, cos, exp, inf, isfinite, log, sinh, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
@@ -79,6 +79,23 @@ def _priced(axis: Axis, peak: float) -> list[_Ramp]:
     return _ramps(axis, peak, exp(z))
 
 
+def _cubic_root(c: float, r: float) -> float:
+    """The one root of v³ + c v = r, for positive c and r."""
+    size = sqrt(c / 3)
+    v = 2 * size * sinh(asinh(r / (2 * size**3)) / 3)
+    return v - (v**3 + c * v - r) / (3 * v**2 + c)
+
+
+def _largest_root(t: float, c: float, r: float, low: float) -> float:
+    """The largest root of v³ - t v² - c v + r, between ``low`` and t, polished where it is nearly double."""
+    p, q = t**2 / 3 + c, r - t * c / 3 - 2 * t**3 / 27
+    v = t / 3 + 2 * sqrt(p / 3) * cos(acos(min(max(-1.5 * q / p * sqrt(3 / p), -1.0), 1.0)) / 3)
+    for _ in range(3):
+        slope = (3 * v - 2 * t) * v - c
+        v -= (((v - t) * v - c) * v + r) / slope if slope > 0 else 0.0
+    return min(max(v, low), t)
+
+
 @dataclass(frozen=True)
 class _Ramp:
     """A ramp under a price of distance."""
@@ -100,6 +117,11 @@ class _Ramp:
         turn, join = self._fall
         v, below, weight = between(*pieces(self._edges(turn, join)), self.peak)
         return float(np.sum(weight * (self.mass**2 * v**2 * np.sqrt(2 * self._height(v, below, turn, join)))))
+
+    @property
+    def _share(self) -> float:
+        """c = κ/(2 m² J)."""
+        return self.price / (2 * self.mass**2 * self.jerk)
 
     def _free(self, v: float) -> float:
         """y0."""
@@ -143,30 +165,19 @@ class _Ramp:
         return turn, self._joined(turn, steep)
 
     def _steep(self) -> float:
-        """The speed below which y0 falls faster than J."""
-
-        def slope(v: float) -> float:
-            return self.price * (2 * self.peak - v) / (2 * self.mass**2 * self.jerk) - v**3
-
-        return self.peak if slope(self.peak) >= 0 else float(brentq(slope, 0.0, self.peak, rtol=1e-14))
+        """The speed below which y0 falls faster than J: v³ + c v = 2 c V."""
+        return min(_cubic_root(self._share, 2 * self._share * self.peak), self.peak)
 
     def _meeting(self) -> float:
-        """The speed at which the rise y = J v meets y0."""
-
-        def gap(v: float) -> float:
-            return 2 * self.mass**2 * self.jerk * v**3 - self.price * (self.peak - v)
-
-        return float(brentq(gap, 0.0, self.peak, rtol=1e-14))
+        """The speed at which the rise y = J v meets y0: v³ + c v = c V."""
+        return min(_cubic_root(self._share, self._share * self.peak), self.peak)
 
     def _joined(self, turn: float, steep: float) -> float:
         """Where the fall meets y0 for the second time; the peak if it does not."""
 
-        def gap(v: float) -> float:
-            return self.jerk * (turn - v) - self._free(v)
-
-        if turn >= self.peak or gap(steep) <= 0:
+        if turn >= self.peak or self.jerk * (turn - steep) <= self._free(steep):
             return self.peak if turn >= self.peak else steep
-        return float(brentq(gap, steep, min(turn, self.peak), rtol=1e-14))
+        return _largest_root(turn, self._share, self._share * self.peak, steep)
 
     def _balance(self, turn: float, steep: float) -> float:
         """∫∂/∂y of the integrand over the fall."""
