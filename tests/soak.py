@@ -76,8 +76,10 @@ def main(arguments: list[str] | None = None) -> int:
         batches = -(-options.chains // _BATCH)
         summary["snaps"] = _stage(test_switching.snap_fault, options.snaps, options.workers)
         summary["chains"] = _stage(test_switching.fault, batches, options.workers) | {"count": batches * _BATCH}
-        summary["studies"] = study_soak.poison(options.cases, options.workers)
-        summary["kills"] = study_soak.killed(options.kills)
+        if options.cases:
+            summary["studies"] = study_soak.poison(options.cases, options.workers)
+        if options.kills:
+            summary["kills"] = study_soak.killed(options.kills)
     _print(summary, console)
     path = journal.path.with_suffix(".json")
     path.write_text(json.dumps(summary, indent=1))

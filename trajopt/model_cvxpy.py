@@ -185,8 +185,10 @@ class ConvexModel:
                 wanted = min(above, value - gap * abs(value)) - constant
                 bound = certificate.lower_bound(program, x, z, wanted) + constant
         ended = perf_counter()
+        with np.errstate(over="ignore"):  # of a run that came to nothing
+            forgiven = _EXCESS * float(np.abs(z).sum())
         return Outcome(
-            claim, status, value, iterations, ended - started, bound, _EXCESS * float(np.abs(z).sum()),
+            claim, status, value, iterations, ended - started, bound, forgiven,
             self._prices(z[program.zero :]), (x, z), name.lower(), ended - solved,
         )  # fmt: skip
 

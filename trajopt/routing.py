@@ -70,7 +70,7 @@ def route_on_mesh(problem: Problem) -> Route:
             "pyomo", "ipopt", "asked for" + (f"; {hindrance}" if hindrance else ", though the problem is convex")
         )
     if hindrance and has_power_bound(problem) and wanted in ("auto", "clarabel"):
-        why = f"{hindrance}; bounded by a cone program (clarabel), then sequential convex programs"
+        why = f"{hindrance}; found by sequential convex programs, bounded by a relaxation"
         return Route("cvxpy", "piqp" if wanted == "auto" else wanted, why)
     if hindrance:
         if wanted != "auto":
