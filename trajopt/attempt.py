@@ -20,6 +20,7 @@ from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, transcribe, transcribe_again
 
 ENOUGH: Final = 1e-9  # gap: no further rung of the ladder is climbed
+_STEP: Final = 1e-7  # and of a step on the way
 
 
 class Clock:
@@ -85,14 +86,14 @@ def convex(
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of solvers and their
     settings until a run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked
     certificate; each rung has the sizes of the best move so far. ``solver``: one rung, alone; a ``step`` on the
-    way needs no bound, so that a claim of the first one is believed.
+    way needs no close bound, and none where the first solvers claim the optimum.
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
     from trajopt.model_cvxpy import QUADRATIC, RESCUES, ConvexModel
 
-    enough *= rounding(setting.mesh)
+    enough = (max(enough, _STEP) if step else enough) * rounding(setting.mesh)
     best: Attempt | None = None
     stated: Sizes | None = None  # for which the model has been built
     for rung in _rungs(setting, solver):
