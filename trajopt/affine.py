@@ -134,16 +134,24 @@ class Affine:
     def quadratic(self, columns: int) -> tuple[sparse.csc_array, Floats, float]:
         """P, q and the constant of a single expression ½x'Px + q'x + constant. Raises ValueError where it is concave in
         a square."""
-        P: Any = sparse.csc_array((columns, columns))
+        diagonal, mixed = np.zeros(columns), []
         q: Any = np.bincount(self.columns, self.values, minlength=columns)
         constant = float(self.constant[0])
         for _, weights, of in self.squares:
             if np.any(weights < 0):
                 raise ValueError(_CONCAVE)
-            A, twice = of.matrix(columns), 2 * weights
-            P = P + A.T @ (sparse.diags_array(twice) @ A)
-            q, constant = q + A.T @ (twice * of.constant), constant + float(weights @ np.square(of.constant))
-        return sparse.csc_array(P), q, constant
+            twice = 2 * weights
+            of_rows = twice[of.rows] * of.values
+            q = q + np.bincount(of.columns, of_rows * of.constant[of.rows], minlength=columns)
+            constant += float(weights @ np.square(of.constant))
+            if len(np.unique(of.rows)) == len(of.rows):  # squares of single variables
+                diagonal += np.bincount(of.columns, of_rows * of.values, minlength=columns)
+            else:
+                A = of.matrix(columns)
+                mixed.append(A.T @ (sparse.diags_array(twice) @ A))
+        at = np.flatnonzero(diagonal)
+        P: Any = sparse.csc_array((diagonal[at], at, np.searchsorted(at, np.arange(columns + 1))), (columns, columns))
+        return sparse.csc_array(sum(mixed, P)), q, constant
 
     def matrix(self, columns: int) -> sparse.csr_array:
         """A, for a stacked variable of that length."""
