@@ -35,11 +35,13 @@ from trajopt.quantities import Quantities
 from trajopt.rebuild import rebuild
 from trajopt.routing import beyond_quadratic
 from trajopt.signals import OnFloats, Signal
+from trajopt.ties import determines_profile
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, Transcript, prescribed, without
 
 _STEPS: Final = 30
 _ENOUGH: Final = 1e-9  # relative: a smaller gain ends the descent; so does a program whose value was as it foretold
+_NEARLY: Final = 1e-7  # and where the program that breaks the tie descends once more
 _TIGHT: Final = 5e-9  # relative gap of the relaxation: it lies further below every move than that
 _TOUCHING: Final = 1e-7  # and with tangents
 _HUMP: Final = 0.75  # of a parabola of velocity, the rest is steady: measured, a program less than with either
@@ -147,6 +149,7 @@ def descend(setting: Setting, start: Trajectory, clock: Clock, feasible: bool = 
     """From a move, ``feasible`` or not, to a local optimum by programs with linearised power; the attempt's prices are
     those of the last one. The outcome claims FAILED where the descent does not settle."""
     objective, duration = setting.problem.objective, start.duration
+    enough = _ENOUGH if determines_profile(setting.problem) else _NEARLY
     here, penalty = start, 0.0
     attempt = Attempt(Outcome(Claim.FAILED, "no step"))
     for step in range(_STEPS):
@@ -156,7 +159,7 @@ def descend(setting: Setting, start: Trajectory, clock: Clock, feasible: bool = 
         penalty = max(penalty, _penalty(attempt))
         value = _cost(objective, here, penalty) if feasible or step else np.inf
         there, best = _search_line(setting, here, attempt.trajectory, value, penalty)
-        settled = min(value - best, abs(best - attempt.value)) <= _ENOUGH * abs(best)
+        settled = min(value - best, abs(best - attempt.value)) <= enough * abs(best)
         if best <= value:
             here = there
         if settled:

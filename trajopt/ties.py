@@ -27,7 +27,7 @@ def break_tie(setting: Setting, attempt: Attempt, chosen: Route, clock: Clock) -
     """
     if attempt.trajectory is None:
         return attempt, chosen
-    if _determines_profile(setting.problem):
+    if determines_profile(setting.problem):
         return attempt, replace(chosen, unique=True)
     for weight in _WEIGHTS:
         second = _with_smoothness(setting, attempt, weight, clock)
@@ -63,7 +63,7 @@ def _costs_nothing(setting: Setting, trajectory: Trajectory, attempt: Attempt) -
     return trajectory.measure(objective) <= best + _COST * rounding(setting.mesh) * max(abs(best), 1e-3 * attempt.size)
 
 
-def _determines_profile(problem: Problem) -> bool:
+def determines_profile(problem: Problem) -> bool:
     """Whether the objective is strictly convex in the top derivative, or in the one below it.
 
     In anything lower it is too flat: the L2 norm of velocity at nodes leaves the jerk to ring at the cost of 1e-9.
