@@ -1,6 +1,6 @@
 """Tightening the bound on power and energy, on request.
 
-Where the relaxation of `trajopt.power` is loose, the lifted squares lie above the squares at a few nodes only: next to
+Where the relaxation of `trajopt.lifted` is loose, the lifted squares lie above the squares at a few nodes only: next to
 where the move leaves the reach that its chord was drawn for. There, the largest and the least speed are asked for of
 any move in the relaxation that costs no more than the answer. No better move is faster or slower, so the chord may be
 drawn between them; the bounds on the speed are those recomputed from the duals. Then the program is relaxed again.
@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 
 from trajopt.attempt import Attempt, Clock, convex
+from trajopt.lifted import Lifted
 from trajopt.mesh import Floats
 from trajopt.objective import Lowered, lower
-from trajopt.power import Lifted
 from trajopt.transcribe import Setting, Transcript, without
 
 Reach = tuple[Floats, Floats]  # (lower, upper) bounds on the speeds
