@@ -123,11 +123,30 @@ def test_cvxpy_and_pyomo_agree(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", QUADRATIC)
-def test_osqp_agrees_on_quadratic_programs(case: str) -> None:
-    clarabel = solved(axis(**CASES[case], intervals=30))
-    osqp = solved(axis(**CASES[case], intervals=30, solver="osqp"))
-    assert osqp.route.solver == "osqp"
-    assert osqp.objective == pytest.approx(clarabel.objective, rel=1e-6)
+def test_solvers_agree_on_quadratic_programs(case: str) -> None:
+    asked = ("clarabel", "piqp", "osqp")
+    found = [solved(axis(**CASES[case], intervals=30, solver=solver)) for solver in asked]
+    assert [solution.route.solver for solution in found] == list(asked)
+    clarabel, piqp, osqp = (solution.objective for solution in found)
+    assert piqp == pytest.approx(clarabel, rel=1e-8)
+    assert osqp == pytest.approx(clarabel, rel=1e-6)
+
+
+def test_a_large_mesh_is_solved_by_the_firm_setting() -> None:
+    """Beyond N = 10000, where the quick one fails: the optimum of continuous time, but for a part of N^-2."""
+    solution = solved(axis("jerk", "l2", distance=1.0, time=1.0, intervals=12_000))
+    assert solution.route.solver == "piqp" and solution.certificate["gap"] <= 1e-7
+    assert solution.objective == pytest.approx(720**0.5, rel=1e-7)  # the quintic: ∫j² dt = 720 D²/T⁵
+
+
+@pytest.mark.parametrize("minimize", ["velocity", "acceleration"])
+def test_a_tie_is_broken_alike_by_all_solvers(minimize: str) -> None:
+    """Peaks leave the move open: the smoothest of the best is one, and costs nothing."""
+    found = [solved(axis(minimize, "linf", intervals=40, solver=solver)) for solver in ("piqp", "clarabel")]
+    tops = [solution.trajectory.chain[-1] for solution in found]
+    assert np.max(np.abs(tops[0] - tops[1])) <= 1e-3 * np.max(np.abs(tops[0]))
+    assert all("l2 minimised" in solution.route.tie_break for solution in found)
+    assert all(s.objective - s.certificate["lower_bound"] <= 1e-8 * s.objective for s in found)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,9 @@ import pytest
 
 import trajopt
 from tests.conftest import axis, solved, table_i, term
+from trajopt import power
+from trajopt.attempt import Clock
+from trajopt.transcribe import Setting
 
 MIXTURE = [term("energy", weight=0.5), term("power", "linf", weight=0.5)]
 TABLE_I_GAPS = [  # exact scheme, N = 200: the objective (computed independently), the gap to certify
@@ -23,6 +26,21 @@ def test_value_and_gap_on_the_axis_of_table_i(minimize: object, norm: str | None
     assert solution.route.model == "cvxpy"
     assert solution.objective == pytest.approx(value, rel=1e-6 if minimize is MIXTURE else 1e-7)
     assert solution.certificate["gap"] <= gap
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_tangents_bound_nearly_as_well_as_squares(seed: int) -> None:
+    """The quadratic programs of the relaxation lie below its cone program, and no farther than a part of the gap."""
+    rng = np.random.default_rng([3, seed])
+    limits = {"velocity": (0.0, rng.uniform(0.3, 0.6)), "acceleration": rng.uniform(3.0, 9.0)}
+    limits["jerk"] = rng.uniform(60.0, 400.0)
+    load = {"inertia": 10.0} | ({"viscous": 4.0, "coulomb": 2.0} if seed % 3 == 2 else {})
+    objective = ([term("power", "l2")], [term("power", "linf")], MIXTURE)[seed % 3]
+    setting = Setting.of(axis(objective, distance=0.254, limits=limits, load=load, intervals=60))
+    relaxed, answer = power.optimum(setting, Clock())
+    cones = power.relax(setting, Clock())
+    assert relaxed.bound <= cones.bound + 1e-7 * answer.value
+    assert cones.bound - relaxed.bound <= 0.05 * (answer.value - cones.bound) + 1e-7 * answer.value
 
 
 def test_energy_closes_the_gap_and_is_solved_globally() -> None:
