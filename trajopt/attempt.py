@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 import norms
-from trajopt.mesh import Mesh
+from trajopt.mesh import LARGE, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Objective, Problem, Term
@@ -134,11 +134,11 @@ def convex(
 
 def rounding(mesh: Mesh) -> float:
     """By how much more than on a small mesh a solver may miss an optimum: rounding grows with the rows."""
-    return max(1.0, mesh.intervals / 1000)
+    return max(1.0, mesh.intervals / 200)
 
 
 def _rungs(setting: Setting, solver: str) -> Sequence[str]:
-    from trajopt.model_cvxpy import LADDER, LARGE, QUADRATIC
+    from trajopt.model_cvxpy import LADDER, QUADRATIC
 
     large = setting.mesh.intervals > LARGE
     if solver != "auto":

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.fields import Table
 from trajopt.problem import Problem
+
+LARGE: Final = 10_000  # intervals: beyond, memory counts, and solvers take firmer settings
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from trajopt import vibration
 from trajopt.envelope import Envelope
 from trajopt.fields import Limit, Table
-from trajopt.mesh import Floats, Mesh, mesh_for
+from trajopt.mesh import LARGE, Floats, Mesh, mesh_for
 from trajopt.model import own_size
 from trajopt.preflight import at_time
 from trajopt.problem import DERIVATIVES, Problem
@@ -111,7 +111,8 @@ def transcribe_again(setting: Setting, empty: Any, duration: float) -> Transcrip
     """`transcribe`, of which the programs of one solve share what they have in common: rows that are kinematic alone
     are laid once, on the ``empty`` model, and copied."""
     problem = setting.problem
-    if problem.vibration or not problem.limits.given().keys() <= set(DERIVATIVES):
+    kinematic = not problem.vibration and problem.limits.given().keys() <= set(DERIVATIVES)
+    if setting.mesh.intervals > LARGE or not kinematic:
         return transcribe(setting, empty, duration)
     key = (id(problem), id(setting.mesh), id(setting.sizes), duration)  # of what the transcript keeps alive
     if key not in setting.laid:
