@@ -31,7 +31,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
         "max_iter": 50, "kkt_solver": "sparse_ldlt_ineq_cond", "preconditioner_iter": 3,
     },
     # A fifth slower, and reliable up to N = 100000, where more than this cannot be asked for.
-    "piqp-firm": {name: 1e-9 for name in _PIQP} | {"max_iter": 100, "reg_lower_limit": 1e-12},
+    "piqp-firm": {name: 1e-9 for name in _PIQP} | {"max_iter": 100, "reg_lower_limit": 1e-12, "preconditioner_iter": 3},
     # Measured: little regularisation is accurate, and fails from N = 20000 on; more solves those.
     "clarabel": _CLARABEL | {"static_regularization_constant": 1e-10},
     "clarabel-firm": _CLARABEL | {"static_regularization_constant": 1e-8},
