@@ -96,7 +96,7 @@ def convex(
     enough = (max(enough, _STEP) if step else enough) * rounding(setting.mesh)
     best: Attempt | None = None
     stated: Sizes | None = None  # for which the model has been built
-    for rung in _rungs(setting, solver):
+    for rung in (solver,) if solver != "auto" else rungs(setting):
         if rung in RESCUES and best is not None and best.gap <= 1e-6:
             break
         if stated is not setting.sizes:
@@ -137,14 +137,14 @@ def rounding(mesh: Mesh) -> float:
     return max(1.0, mesh.intervals / 200)
 
 
-def _rungs(setting: Setting, solver: str) -> Sequence[str]:
+def rungs(setting: Setting) -> Sequence[str]:
+    """The solvers and settings that a program goes to in turn: those of PIQP or Clarabel where asked for, else all; on a
+    large mesh without the first, which fails there."""
     from trajopt.model_cvxpy import LADDER, QUADRATIC
 
-    large = setting.mesh.intervals > LARGE
-    if solver != "auto":
-        return (QUADRATIC[1] if large and solver == QUADRATIC[0] else solver,)
-    passed = QUADRATIC if setting.problem.transcription.solver == "clarabel" else QUADRATIC[:1] if large else ()
-    return [rung for rung in LADDER if rung not in passed]
+    own = {"piqp": QUADRATIC, "clarabel": tuple(rung for rung in LADDER if rung not in QUADRATIC)}
+    found = own.get(setting.problem.transcription.solver, LADDER)
+    return found[1:] if found[0] == QUADRATIC[0] and setting.mesh.intervals > LARGE else found
 
 
 def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, widen: Sequence[str] = ()) -> Attempt:

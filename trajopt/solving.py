@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 import norms
-from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, smoothest, to, unlimited
+from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, rungs, smoothest, to, unlimited
 from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import findings
 from trajopt.explain import explain_power, tested
@@ -94,7 +94,7 @@ def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution
     elif _is_affine(problem):
         solution, attempt = _convex(setting, lean, chosen, clock)
     else:
-        solution, attempt = _by_cones(setting, lean, chosen, clock)
+        solution, attempt = _by_descent(setting, lean, chosen, clock)
     ended = attempt.trajectory is None and attempt.outcome.claim in (Claim.INFEASIBLE, Claim.LIMIT)
     if solution.status.solved or lean is setting or ended:
         return solution
@@ -155,7 +155,7 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     """One convex program, and a second one where it leaves a tie."""
     duration = setting.problem.move.fixed_time
     assert duration is not None
-    solver = chosen.solver if setting.problem.transcription.solver in ALONE else "auto"
+    solver = "osqp" if chosen.solver == "osqp" else "auto"
     attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock)
     return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
 
@@ -170,9 +170,7 @@ def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Cloc
     inner = convex(drawn_in(lean, _DRAWN), first.trajectory.duration, to(lean.problem.objective), clock)
     if inner.trajectory is not None:
         yield replace(inner, bound=first.bound, notes=first.notes), chosen
-    from trajopt.model_cvxpy import LADDER
-
-    for rung in LADDER[1:] if first.gap <= ENOUGH else ():
+    for rung in rungs(lean)[1:] if first.gap <= ENOUGH else ():
         other = convex(lean, first.trajectory.duration, to(lean.problem.objective), clock, rung)
         if other.trajectory is not None:
             yield _priced(lean, other, clock), chosen
@@ -209,8 +207,8 @@ def _shortest_candidates(
         yield attempt, chosen
 
 
-def _by_cones(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
-    """Power or energy: the bound of the relaxation, and from its answer a descent by convex programs, or by Ipopt."""
+def _by_descent(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
+    """Power or energy: a descent by convex programs, or by Ipopt where it does not settle, and a relaxation's bound."""
     relaxed, answer = optimum(lean, clock)
     if relaxed.trajectory is None:
         return conclude(setting, chosen, relaxed, clock), relaxed
