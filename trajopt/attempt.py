@@ -138,8 +138,8 @@ def rounding(mesh: Mesh) -> float:
 
 
 def rungs(setting: Setting) -> Sequence[str]:
-    """The solvers and settings that a program goes to in turn: those of PIQP or Clarabel where asked for, else all; on a
-    large mesh without the first, which fails there."""
+    """The solvers and settings that a program goes to in turn: those of PIQP or Clarabel where asked for, else all; on
+    a large mesh without the first, which fails there."""
     from trajopt.model_cvxpy import LADDER, QUADRATIC
 
     own = {"piqp": QUADRATIC, "clarabel": tuple(rung for rung in LADDER if rung not in QUADRATIC)}
