@@ -67,9 +67,10 @@ def relax(setting: Setting, clock: Clock, touch: Sequence[Touch] = (), answer: f
 
 
 def _is_quadratic(problem: Problem) -> bool:
-    """Whether the relaxation is a linear or quadratic program but for its squares."""
+    """Whether the relaxation is a linear or quadratic program but for its squares, and it is known where to."""
     electrical = any(term.minimize == "electrical_energy" for term in problem.objective.all_terms)
-    return problem.order == 3 and not electrical and not beyond_quadratic(problem)
+    placed = isinstance(problem.move.end.position, float)
+    return problem.order == 3 and placed and not electrical and not beyond_quadratic(problem)
 
 
 def _between_tangents(setting: Setting, clock: Clock) -> tuple[Attempt, Attempt] | None:
