@@ -10,6 +10,7 @@ from trajopt.switching.polynomials import audit
 from trajopt.switching.third import Profile, extremals
 
 _SAME = 1e-9  # relative: two durations are one
+_EDGE = 1e-9  # relative: how much wider limits must make a move possible for it to be at the edge
 
 
 class OutOfRange(Unresolved):
@@ -65,6 +66,11 @@ def normalised(chain: Chain) -> tuple[Chain, tuple[float, ...], float]:
     return chain.scaled(length, time), tuple(length / time**i for i in range(n + 1)), time
 
 
+def _widened(limits: tuple[float, float]) -> tuple[float, float]:
+    low, high = limits
+    return low - _EDGE * abs(low), high + _EDGE * abs(high)
+
+
 def _without_position(chain: Chain) -> Chain:
     return Chain(chain.order, ((-inf, inf), *chain.limits[1:]), chain.start, chain.end)
 
@@ -74,7 +80,13 @@ def _twins(a: Profile, b: Profile) -> bool:
 
 
 def _nothing(chain: Chain) -> Impossible | Unresolved:
-    """An axis that can wait and turn about can do any move; one that cannot is bound by what keeps it from that."""
+    """An axis that can wait and turn about can do any move; one that cannot is bound by what keeps it from that. A move
+    that would be possible within limits a little wider may be so within these: a rounding at the edge decides nothing.
+    """
+    wide = Chain(chain.order, tuple(map(_widened, chain.limits)), chain.start, chain.end)
+    free = _without_position(normalised(wide)[0])
+    if any(audit(free, profile.tops, profile.durations).accepted for profile in extremals(free)):
+        return Unresolved("the move is at the edge of what is possible")
     for name, (low, high) in zip(NAMES[1:], chain.limits[1:], strict=False):
         if not low < 0 < high:
             return Impossible(f"no move covers {chain.distance:g} with {name} from {low:g} to {high:g}")
