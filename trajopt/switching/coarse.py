@@ -88,6 +88,8 @@ class Grid:
 
     def _solve(self, cost: Vector, prescribed: int) -> Any:
         sizes = [np.max(np.abs(m)) for m in self.maps]
+        if not all(sizes):  # of a duration so short that nothing moves
+            return None
         rows = [sign * self.maps[i][:-1] / sizes[i] for i, sign, _ in self._sides()]
         bounds = [(limit - sign * self.free[i][:-1]) / sizes[i] for i, sign, limit in self._sides()]
         goal = (self.chain.distance, *self.chain.end[1:])
