@@ -10,7 +10,7 @@ from scipy.optimize import root
 from trajopt.velocity_domain.motor import Floats
 
 _ROUNDS = 80
-_MET = 1e-10
+_MET = 1e-10  # of functions of size one: where both are this small they vanish
 _SETTLED = 1e-10  # relative: a Newton step this small leaves an error of its square
 
 
