@@ -90,7 +90,7 @@ def test_all_limits_together(impossible: tuple[Problem, trajopt.Solution]) -> No
 
     def scaled(factor: float) -> Problem:
         changed = problem
-        for name, limit in problem.limits.given().items():
+        for name, limit in problem.limits.given.items():
             for side in ("min", "max"):
                 if getattr(limit, side):
                     changed = changed.with_limit(f"{name}.{side}", getattr(limit, side) * factor)

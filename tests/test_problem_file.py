@@ -353,3 +353,11 @@ def test_any_override_is_read_or_refused(key: str, value: str) -> None:
             problem_file.parse(LINEAR, [override])
         except BadInput as error:
             check(error)
+
+
+def test_a_changed_copy_does_not_keep_what_was_worked_out_from_the_original() -> None:
+    problem = problem_file.load("clemen_rupp_jerk_l2")
+    assert problem.order == 3 and "jerk" in problem.limits.given
+    limits = problem.limits.model_copy(update={"jerk": None, "snap": Limit(min=-1e5, max=1e5)})
+    assert set(limits.given) == {*problem.limits.given, "snap"} - {"jerk"}
+    assert problem.model_copy(update={"limits": limits}).order == 4

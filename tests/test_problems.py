@@ -40,7 +40,7 @@ def test_it_says_what_it_is(name: str) -> None:
 @pytest.mark.parametrize("name", PAPER)
 def test_the_paper_s_cases_state_table_i(name: str) -> None:
     problem = trajopt.load(name)
-    given = {kind: (limit.lowest, limit.highest) for kind, limit in problem.limits.given().items()}
+    given = {kind: (limit.lowest, limit.highest) for kind, limit in problem.limits.given.items()}
     jerk = 981.0 if name.endswith("jerk10") else 98.1
     assert given == {
         "velocity": (0.0, 0.5),

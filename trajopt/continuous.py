@@ -74,7 +74,7 @@ def _one_way_rest_to_rest(problem: Problem) -> bool:
     placed = isinstance(move.end.position, float) and move.start_position is not None
     plain = not move.via and not problem.vibration and problem.transcription.scheme == "exact"
     constant = isinstance(load.inertia, float) and not load.curves
-    constant = constant and not any(x.varies for x in problem.limits.given().values())
+    constant = constant and not any(x.varies for x in problem.limits.given.values())
     moves = problem.one_way and move.fixed_time and placed and _distance(problem) > 0
     return bool(at_rest and plain and constant and moves)
 
@@ -90,7 +90,7 @@ def _motor_alone(problem: Problem) -> bool:
     """A motor without a jerk limit, for what it takes or loses."""
     known = {"velocity", "acceleration", "current", "voltage"}
     wanted = problem.objective.terms[0].minimize in ("electrical_energy", "copper_loss")
-    return wanted and problem.order == 2 and set(problem.limits.given()) <= known
+    return wanted and problem.order == 2 and set(problem.limits.given) <= known
 
 
 def _mass_alone(problem: Problem, metrics: Mapping[str, float]) -> bool:
@@ -100,12 +100,12 @@ def _mass_alone(problem: Problem, metrics: Mapping[str, float]) -> bool:
     idle = power is not None and metrics["peak_power"] < min(power.highest, -power.lowest) * (1 - 1e-3)
     known = {"velocity", "acceleration", "jerk", *(("power",) if idle else ())}
     load, wanted = problem.load, problem.objective.terms[0].label in ("energy", "power linf", "power l2")
-    return wanted and not (load.viscous or load.coulomb) and problem.order <= 3 and set(problem.limits.given()) <= known
+    return wanted and not (load.viscous or load.coulomb) and problem.order <= 3 and set(problem.limits.given) <= known
 
 
 def _ways(problem: Problem, name: str) -> tuple[float, float]:
     """A limit along the move and against it, as sizes."""
-    limit = problem.limits.given().get(name)
+    limit = problem.limits.given.get(name)
     if limit is None:
         return inf, inf
     along, against = limit.highest, -limit.lowest
@@ -180,7 +180,7 @@ def _middles(trajectory: Trajectory, name: str) -> Any:
 
 
 def _on_limit(problem: Problem, name: str, value: float) -> bool:
-    limit = problem.limits.given().get(name)
+    limit = problem.limits.given.get(name)
     if limit is None:
         return False
     sides = (side for side in (limit.lowest, limit.highest) if side and isfinite(side))

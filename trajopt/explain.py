@@ -73,7 +73,7 @@ def at_longest(problem: Problem) -> Problem:
 
 
 def _kinematic(problem: Problem) -> dict[str, Limit]:
-    return {name: limit for name, limit in problem.limits.given().items() if name not in ("power", "brake_energy")}
+    return {name: limit for name, limit in problem.limits.given.items() if name not in ("power", "brake_energy")}
 
 
 def _sides(problem: Problem) -> dict[str, list[str]]:
@@ -102,7 +102,7 @@ def _times(setting: Setting, clock: Clock) -> dict[str, Any]:
     """The least time on this mesh and, where its switching times are found, in continuous time; where the axis cannot
     wait at an end, every interval of possible times."""
     problem = setting.problem
-    if problem.move.via or any(limit.varies for limit in problem.limits.given().values()) or has_free_ends(problem):
+    if problem.move.via or any(limit.varies for limit in problem.limits.given.values()) or has_free_ends(problem):
         return {"least_time": None}
     move = problem.move.model_copy(update={"time": FREE})
     free = replace(setting, problem=problem.model_copy(update={"move": move}))  # the objective decides the order
@@ -197,7 +197,7 @@ def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock
     """What one limit would have to be, all others as they are; ``value`` None where no value is enough (``never``, by a
     certificate) or none was found in the time."""
     quantity, _, side = name.partition(".")
-    limit = setting.problem.limits.given()[quantity]
+    limit = setting.problem.limits.given[quantity]
     now = limit.lowest if side == "min" else limit.highest
     without_it = without(setting, [quantity]).problem
     roomy = replace(setting, sizes=sizes_of(without_it, setting.problem.order))

@@ -33,6 +33,13 @@ class Section(BaseModel):
 
             raise BadInput(explain(error, type(self))) from None
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A changed copy, not validated; without the cached properties of the original, which it need not share."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in copied.__dict__.keys() - type(self).model_fields.keys():
+            del copied.__dict__[name]
+        return copied
+
     # Else pydantic takes it for one that validation must go through, and loses the context (units) on the way.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 

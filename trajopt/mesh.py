@@ -65,7 +65,7 @@ def mesh_for(*problems: Problem, also: Sequence[float] = ()) -> Mesh:
 
 def _corners(problem: Problem) -> Iterator[float]:
     """Times (s) at which a limit or the load has a corner, or a via state is passed."""
-    for limit in problem.limits.given().values():
+    for limit in problem.limits.given.values():
         yield from limit.breakpoints
     if isinstance(problem.load.inertia, Table):
         yield from problem.load.inertia.time

@@ -90,14 +90,14 @@ def _time(problem: Problem) -> None:
     if fixed:
         return
     if problem.move.time == "free" and len(problem.objective.terms) == 1:
-        if not (limited := set(problem.limits.given()) - {"position"}):
+        if not (limited := set(problem.limits.given) - {"position"}):
             raise ValueError('limits: nothing bounds the move: least time needs one such as acceleration = "5 m/s^2"')
         if limited == {"velocity"} and (side := _unbounded_side(problem)):
             remedy = 'give it, or a limit such as acceleration = "5 m/s^2"'
             raise ValueError(f"limits.velocity.{side}: is missing, and the least time is 0 s without it; {remedy}")
     if problem.move.time == "free" and _stays(problem):
         raise ValueError("move.end: the move ends in the state in which it starts: it takes no time; give move.time")
-    if any(limit.varies for limit in problem.limits.given().values()) or problem.move.via:
+    if any(limit.varies for limit in problem.limits.given.values()) or problem.move.via:
         raise ValueError('move.time: limits by time and via states need a fixed move.time such as "1 s"')
     if isinstance(problem.load.inertia, Table):
         raise ValueError('move.time: an inertia that varies in time needs a fixed move.time such as "1 s"')
@@ -120,7 +120,7 @@ def _stays(problem: Problem) -> bool:
 def _load(problem: Problem) -> None:
     load = problem.load
     named = {f"objective {term.minimize}": term.minimize for term in problem.objective.all_terms}
-    named |= {f"limits.{name}": name for name in problem.limits.given()}
+    named |= {f"limits.{name}": name for name in problem.limits.given}
     needs = [where for where, name in named.items() if name in (*LOADED, *ELECTRICAL)]
     if needs and load.inertia is None:
         remedy = 'write inertia = "4e-4 kg m^2"' if problem.rotary else 'write mass = "10 kg"'

@@ -51,7 +51,7 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
     found: dict[str, tuple[float, float]] = {}
     for key, rows in attempt.outcome.prices.items():
         quantity, _, side = key.partition(".")
-        symmetric = side != "at_most" and problem.limits.given()[quantity].symmetric
+        symmetric = side != "at_most" and problem.limits.given[quantity].symmetric
         name, outwards = (quantity, 1.0) if symmetric else (key, -1.0 if side == "min" else 1.0)
         unit, own = found.get(name, (0.0, 0.0))
         change = -rows.per_unit * attempt.slope
@@ -64,7 +64,7 @@ def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> fl
     problem = setting.problem
     if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.pair is None:
         return None
-    if any(limit.varies for limit in problem.limits.given().values()):
+    if any(limit.varies for limit in problem.limits.given.values()):
         return None
     now, later = (lagrangian(setting, duration * (1 + s), goal, attempt) for s in (0.0, _STEP))
     return attempt.slope * (later - now) / (_STEP * duration)
@@ -93,7 +93,7 @@ def _unit(problem: Problem, name: str) -> str:
 def _names(problem: Problem) -> list[str]:
     """Every limit by the name of its price: as a whole where it is symmetric, else by its sides."""
     names: list[str] = []
-    for quantity, limit in problem.limits.given().items():
+    for quantity, limit in problem.limits.given.items():
         sides = [f"{quantity}.{side}" for side in ("min", "max") if getattr(limit, side) is not None]
         names += [quantity] if limit.symmetric else sides
     return names + [f"{ceiling.term.label}.at_most" for ceiling in problem.objective.ceilings or ()]
@@ -102,7 +102,7 @@ def _names(problem: Problem) -> list[str]:
 def _is_zero(problem: Problem, name: str) -> bool:
     """Whether a limit is zero, so that a percentage of it means nothing."""
     quantity, _, side = name.partition(".")
-    return side in ("min", "max") and getattr(problem.limits.given()[quantity], side) == 0.0
+    return side in ("min", "max") and getattr(problem.limits.given[quantity], side) == 0.0
 
 
 def sentence(row: Mapping[str, Any], name: str, label: str) -> str:

@@ -7,6 +7,7 @@ in files they are texts with a unit (see `trajopt.units` and `trajopt.problem_fi
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -151,7 +152,8 @@ class Limits(Section):
     rms_force: Annotated[Limit | None, read_ceiling("rms_force")] = None
     brake_energy: Annotated[Limit | None, read_ceiling("brake_energy")] = None
 
-    def given(self) -> dict[str, Limit]:
+    @cached_property
+    def given(self) -> Mapping[str, Limit]:
         """The limits there are, by name; of the envelope what holds each of its lines."""
         found = {name: limit for name in type(self).model_fields if (limit := getattr(self, name)) is not None}
         return {name: limit.limit if isinstance(limit, Envelope) else limit for name, limit in found.items()}
@@ -489,11 +491,11 @@ class Problem(Whole):
         refuse_contradictions(self)
         return self
 
-    @property
+    @cached_property
     def order(self) -> int:
         """Which derivative is the top one, piecewise constant: 4 (snap) when snap or a boundary jerk is mentioned,
         3 (jerk) when jerk or a boundary acceleration is, else 2; the Euler scheme always carries jerk (eq. 4)."""
-        mentioned = {*self.limits.given(), *(term.minimize for term in self.objective.all_terms)}
+        mentioned = {*self.limits.given, *(term.minimize for term in self.objective.all_terms)}
         states = (self.move.start, self.move.end, *self.move.via)
         if "snap" in mentioned or any(state.jerk is not None for state in states):
             return 4
@@ -501,7 +503,7 @@ class Problem(Whole):
             return 3
         return 3 if any(state.acceleration is not None for state in states) else 2
 
-    @property
+    @cached_property
     def one_way(self) -> int:
         """+1 or -1 when the velocity limits allow one direction only, else 0."""
         velocity = self.limits.velocity

@@ -168,7 +168,7 @@ def _table(solution: Solution) -> Table:
     for heading in ("peak", "rms", "limit"):
         table.add_column(heading, justify="right")
     table.add_column("unit")
-    given = solution.problem.limits.given()
+    given = solution.problem.limits.given
     for name in _ROWS:
         if f"peak_{name}" not in solution.metrics:
             continue

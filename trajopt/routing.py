@@ -94,7 +94,7 @@ def _lean(problem: Problem) -> Problem:
 
 def nonaffine_limits(problem: Problem) -> list[str]:
     """The limits that make a convex problem nonconvex; they are tried without first."""
-    return [name for name in problem.limits.given() if not is_affine(problem, name)]
+    return [name for name in problem.limits.given if not is_affine(problem, name)]
 
 
 def is_time_search(problem: Problem) -> bool:
@@ -116,7 +116,7 @@ def has_power_bound(problem: Problem) -> bool:
     """Whether `trajopt.power` can bound power and energy globally: exact scheme, jerk or acceleration on top, fixed
     time, one way, ends of given velocity (and acceleration), equal steps. Elsewhere no global bound is known."""
     move = problem.move
-    varies = any(limit.varies for limit in problem.limits.given().values()) or bool(problem.load.curves)
+    varies = any(limit.varies for limit in problem.limits.given.values()) or bool(problem.load.curves)
     varies = varies or not isinstance(problem.load.inertia, float)
     return (
         problem.transcription.scheme == "exact"

@@ -38,7 +38,7 @@ def as_chain(problem: Problem) -> Chain | None:
     Its duration is free, if only in a range. It takes constant limits on derivatives up to a limited top one, given
     states at both ends, and a force limit where the force is an acceleration in disguise.
     """
-    move, limits = problem.move, problem.limits.given()
+    move, limits = problem.move, problem.limits.given
     kinematic = limits.keys() <= {*DERIVATIVES, "force"}
     more = move.via or problem.vibration or problem.transcription.scheme != "exact" or not kinematic
     timed = move.fixed_time is None and [term.minimize for term in problem.objective.terms] == ["time"]
@@ -216,7 +216,7 @@ def _prices(problem: Problem, arcs: Arcs) -> list[dict[str, Any]]:
     """What each limit that the arcs run on or touch costs, by two shortest moves beside this one."""
     found = {}
     met = {*arcs.active, *(name for _, name in arcs.touches)}
-    for quantity, limit in problem.limits.given().items():
+    for quantity, limit in problem.limits.given.items():
         known_as = "acceleration" if quantity == "force" else quantity
         sides = [side for side in ("min", "max") if f"{known_as}.{side}" in met]
         for name in [quantity] if limit.symmetric and sides else [f"{quantity}.{side}" for side in sides]:

@@ -111,7 +111,7 @@ def transcribe_again(setting: Setting, empty: Any, duration: float) -> Transcrip
     """`transcribe`, of which the programs of one solve share what they have in common: rows that are kinematic alone
     are laid once, on the ``empty`` model, and copied."""
     problem = setting.problem
-    kinematic = not problem.vibration and problem.limits.given().keys() <= set(DERIVATIVES)
+    kinematic = not problem.vibration and problem.limits.given.keys() <= set(DERIVATIVES)
     if setting.mesh.intervals > LARGE or not kinematic:
         return transcribe(setting, empty, duration)
     key = (id(problem), id(setting.mesh), id(setting.sizes), duration)  # of what the transcript keeps alive
@@ -145,7 +145,7 @@ def hold(transcript: Transcript) -> None:
     are known."""
     problem = transcript.problem
     special = {"envelope": _envelope, "rms_force": _rms, "brake_energy": _brake}
-    for name, limit in problem.limits.given().items():
+    for name, limit in problem.limits.given.items():
         special.get(name, _limit)(transcript, name, limit)
     for mode in problem.vibration:
         vibration.rows(transcript, mode)

@@ -95,7 +95,7 @@ def servomotor(problem: trajopt.Problem, n: int) -> float:
     duration, distance = move.fixed_time, move.end.position
     assert duration is not None and isinstance(distance, float)
     assert load.torque_constant is not None and load.resistance is not None and isinstance(load.inertia, float)
-    h, most = duration / n, problem.limits.given()["acceleration"].highest
+    h, most = duration / n, problem.limits.given["acceleration"].highest
     q, v, a = _chain(opti, 2, n, h, [distance, distance / duration, most])
     energy: Any = 0.0
     for speed in (v[:-1], v[1:]):

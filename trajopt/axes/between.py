@@ -45,7 +45,7 @@ def restored(motion: Motion, problem: Any) -> Motion:
 
 
 def _of_axis(axis: Trajectory) -> float:
-    limits = axis.problem.limits.given()
+    limits = axis.problem.limits.given
     found = [0.0]
     for name in (name for name in limits if name not in (*DERIVATIVES, "rms_force")):
         values = np.array([axis.signal(name).within(OnFloats(), s) for s in _PARTS])

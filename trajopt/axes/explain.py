@@ -81,7 +81,7 @@ def _fastest(move: Problem, time: float, clock: Clock) -> float | None:
     grid = move.transcription.model_copy(update={"intervals": _INTERVALS, "scheme": "exact", "solver": "auto"})
     setting = without(
         Setting.of(move.model_copy(update={"move": own, "transcription": grid})),
-        [name for name in move.limits.given() if name in ("force", "power", "rms_force")],
+        [name for name in move.limits.given if name in ("force", "power", "rms_force")],
     )
     best = 0.0
     for sign in (1.0, -1.0):

@@ -65,7 +65,7 @@ def _names(motion: Motion) -> list[str]:
 def _limits(axes: Any, motion: Motion, name: str) -> None:
     """Constant limits as grey dashes where they are in view, else named."""
     reach = max(float(np.max(np.abs(line.get_ydata()))) for line in axes.lines)
-    found = [axis.limits.given().get(name) for axis in motion.problem.axes]
+    found = [axis.limits.given.get(name) for axis in motion.problem.axes]
     sides = {x for limit in found if limit is not None for x in (limit.lowest, limit.highest) if np.isfinite(x)}
     far = sorted({abs(x) for x in sides if abs(x) > _IN_VIEW * reach})
     for x in sides:

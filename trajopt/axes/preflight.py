@@ -53,7 +53,7 @@ def _arm(problem: AxesProblem) -> None:
         given = axis.load.model_dump(exclude_defaults=True)
         if wrong := next((key for key in given if key != "viscous"), None):
             raise ValueError(f"axes[{k}].load.{wrong}: the load of a joint is the arm; leave it out (viscous may stay)")
-        if wrong := next((name for name in axis.limits.given() if name not in IN_ARMS), None):
+        if wrong := next((name for name in axis.limits.given if name not in IN_ARMS), None):
             raise ValueError(f"axes[{k}].limits.{wrong}: not known on an arm; one of {', '.join(IN_ARMS[:-1])}")
     for k, term in enumerate(problem.objective.terms):
         if term.minimize not in IN_ARMS:
@@ -77,7 +77,7 @@ def _tip(problem: AxesProblem) -> None:
         return
     if isinstance(tip.release, float):
         _release(problem, tip.release)
-    elif tip.release == FREE and any(limit.varies for axis in problem.axes for limit in axis.limits.given().values()):
+    elif tip.release == FREE and any(limit.varies for axis in problem.axes for limit in axis.limits.given.values()):
         raise ValueError("tip.release: limits by time need a fixed one such as \"0.7 s\"")
     if tip.release == FREE and any(axis.limits.rms_force or axis.move.via for axis in problem.axes):
         raise ValueError('tip.release: via states and RMS limits need a fixed one such as "0.7 s"')

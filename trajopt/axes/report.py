@@ -71,7 +71,7 @@ def _table(solution: AxesSolution) -> Table:
     for name in _ROWS:
         cells, kinds = [], [units.kinds(axis.rotary)[name] for axis in solution.problem.axes]
         for axis, kind in zip(solution.problem.axes, kinds, strict=True):
-            found, limit = solution.metrics.get(f"{axis.name}.peak_{name}"), axis.limits.given().get(name)
+            found, limit = solution.metrics.get(f"{axis.name}.peak_{name}"), axis.limits.given.get(name)
             most = "" if limit is None else f" ({max(abs(limit.lowest), abs(limit.highest)):g})"
             cells.append("" if found is None else f"{found:.6g}{most}{f' {kind.unit}' if mixed else ''}")
         if any(cells):

@@ -103,7 +103,7 @@ def verify(
 def _rows(
     problem: Problem, seen: Reconstruction, ideal: Reconstruction, duration: float, kind: str
 ) -> Iterator[Row]:
-    limits, kinds = problem.limits.given(), units.kinds(problem.rotary)
+    limits, kinds = problem.limits.given, units.kinds(problem.rotary)
     unrounded = _signals(problem, ideal, duration)
     for name, signal in _signals(problem, seen, duration).items():
         limit, unit = limits.get(name), kinds[name].unit

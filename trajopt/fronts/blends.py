@@ -32,7 +32,7 @@ def blends(first: Trajectory, second: Trajectory, terms: Sequence[Term], count: 
 
 def _keeps_nonconvex_limits(move: Trajectory) -> bool:
     for name in nonaffine_limits(move.problem):
-        limit = move.problem.limits.given()[name]
+        limit = move.problem.limits.given[name]
         if name not in ("power", "force", "current", "voltage") or limit.varies:
             return False
         if peak(move.signal(name)) > min(-limit.lowest, limit.highest):

@@ -170,7 +170,7 @@ def _slopes(task: Task, solution: Solution) -> tuple[float, ...] | None:
 def stretches(problem: Problem, terms: Sequence[Term]) -> bool:
     """Whether a move stretched in time keeps all limits and costs no more: from rest to rest, without tables, vias and
     modes. With a load only where nothing acts but the inertia: the parts of a sum fall, but by different factors."""
-    move, limits = problem.move, problem.limits.given()
+    move, limits = problem.move, problem.limits.given
     ends = [state.fixed(problem.order) for state in (move.start, move.end)]
     rest = all(state.get(i) == 0.0 for state in ends for i in range(1, problem.order))
     around_zero = all(x.lowest <= 0 <= x.highest for name, x in limits.items() if name != "position")

@@ -81,7 +81,7 @@ def _region(axes: Axes, problem: Problem, speed: Floats, force: Floats) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=GREY, linewidth=0.6, zorder=1)
     inside = np.full(v.shape, np.inf)
-    limits = problem.limits.given()
+    limits = problem.limits.given
     for name, style in zip(_limited(problem), STYLES[1:], strict=False):
         room = _room(limits[name], _value(problem, name, v, f))
         axes.contour(v, f, room, levels=[0.0], colors=["black"], linestyles=[style], linewidths=1.0, zorder=2)

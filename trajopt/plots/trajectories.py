@@ -231,7 +231,7 @@ def _panels(names: list[str], trajectory: Trajectory) -> Panels:
 
 def _sides(trajectory: Trajectory, name: str, time: Floats) -> list[Floats]:
     """The limits of a signal at times (s): of a force also what the torque-speed envelope leaves at that speed."""
-    limit: Limit | None = trajectory.problem.limits.given().get(name)
+    limit: Limit | None = trajectory.problem.limits.given.get(name)
     sides = [] if limit is None else [side for side in limit.at(time) if side is not None]
     envelope = trajectory.problem.limits.envelope
     if name == "force" and envelope is not None:
@@ -281,7 +281,7 @@ def _reach(axes: Axes) -> tuple[float, float]:
 
 def limit_lines(trajectory: Trajectory, name: str) -> list[tuple[Floats, Floats]]:
     """(time, value) of the lower and the upper limit, with every corner."""
-    limit: Limit | None = trajectory.problem.limits.given().get(name)
+    limit: Limit | None = trajectory.problem.limits.given.get(name)
     corners = () if limit is None else limit.breakpoints
     time = np.unique([0.0, *(t for t in corners if 0 < t < trajectory.duration), trajectory.duration])
     if name == "force" and trajectory.problem.limits.envelope is not None:

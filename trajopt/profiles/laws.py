@@ -102,7 +102,7 @@ class Laid:
         """The limits that the law does not keep, by name; a jump counts as infinite."""
         fine = self.signals(np.linspace(0.0, 1.0, _FINE))
         found = []
-        for name, limit in self.problem.limits.given().items():
+        for name, limit in self.problem.limits.given.items():
             if name == "rms_force":
                 out = _cycle_rms(self) > limit.highest * (1 + _KEPT)
             elif name in fine:
