@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 import norms
+from trajopt.lagrangian import Lagrangian
 from trajopt.mesh import LARGE, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
@@ -184,17 +185,9 @@ def free_duration(setting: Setting, model: Any, start: float) -> Any:
 def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:
     """The Lagrangian, at the attempt's primal and dual vector, of its program with another duration."""
     assert attempt.outcome.pair is not None and attempt.trajectory is not None
-    setting = replace(setting, sizes=attempt.trajectory.sizes)
-    if attempt.convex:
-        from trajopt.model_cvxpy import ConvexModel
-
-        transcript = transcribe_again(setting, ConvexModel(), duration)
-    else:
-        from trajopt.model_pyomo import NonconvexModel
-
-        transcript = transcribe(setting, NonconvexModel(), duration)
-    transcript.model.minimize(goal(transcript).expression)
-    return float(transcript.model.lagrangian(attempt.outcome.pair))
+    model = Lagrangian(attempt.outcome.pair, attempt.convex)
+    model.minimize(goal(transcribe(replace(setting, sizes=attempt.trajectory.sizes), model, duration)).expression)
+    return model.value
 
 
 def _read(setting: Setting, transcript: Transcript, lowered: Lowered, outcome: Outcome) -> Attempt:

@@ -41,6 +41,15 @@ class Prices:
 
 
 @dataclass(frozen=True)
+class Pair:
+    """The primal and dual vector of an answer, for `trajopt.lagrangian`: the variables, and the multipliers of the
+    rows, that the builder asked for, in that order; bounds of variables left out."""
+
+    primal: Floats
+    dual: Floats
+
+
+@dataclass(frozen=True)
 class Outcome:
     """The end of one solver run: its claim, its own word for it, objective value, iterations and seconds."""
 
@@ -52,7 +61,7 @@ class Outcome:
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
     forgiven: float = 0.0  # what the check lets pass in the rows, times multipliers: a bound may lie so far above
     prices: dict[str, Prices] = field(default_factory=dict)
-    pair: tuple[Floats, Floats] | None = None  # the primal and dual vector, for `Model.lagrangian`
+    pair: Pair | None = None
     solver: str = ""  # of a convex program: the one of several that this is the end of
     proof: float = 0.0  # s, of ``seconds``, that our own bound took
 
@@ -87,9 +96,6 @@ class Model(Rows, Protocol):
 
     def value(self, x: Any) -> Floats:
         """The floats of an expression after a run."""
-
-    def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        """The Lagrangian of this program at another's primal and dual vector; its slope in a parameter is a price."""
 
     def run(self, solver: str, seconds: float | None = None) -> Outcome:
         """Hand the program, now complete, to a solver, or to a further one where the first failed. Never raises for a

@@ -6,6 +6,7 @@ own canonicalisation would arrive at: that took ten times as long as solving it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from time import perf_counter
@@ -20,7 +21,7 @@ from scipy import sparse
 from trajopt import certificate
 from trajopt.affine import Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Outcome, Prices, own_size
+from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size
 
 cp: Any = cvxpy  # its atoms are exported in a way that type checkers do not see
 _CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
@@ -55,11 +56,9 @@ class ConvexModel:
 
     def __init__(self) -> None:
         self._count = 0
-        self._equal: list[Affine] = []
-        self._below: list[Affine] = []
-        self._inside: list[Affine] = []  # of second-order cones, of these sizes
+        self._rows = {"equal": _Rows(), "below": _Rows(), "inside": _Rows()}  # of second-order cones, of these sizes
         self._sizes: list[int] = []
-        self._last = 0
+        self._asked: tuple[list[slice], list[tuple[str, slice]]] = [], []  # see `trajopt.model.Pair`
         self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
@@ -68,9 +67,9 @@ class ConvexModel:
     def copied(self) -> ConvexModel:
         """A model with the same rows and variables so far, to be completed by itself."""
         twin = ConvexModel()
-        twin._count, twin._last = self._count, self._last
-        twin._equal, twin._below = [*self._equal], [*self._below]
-        twin._inside, twin._sizes = [*self._inside], [*self._sizes]
+        twin._count, twin._sizes = self._count, [*self._sizes]
+        twin._rows = {kind: _Rows([*rows.parts], rows.count) for kind, rows in self._rows.items()}
+        twin._asked = [*self._asked[0]], [*self._asked[1]]
         twin._names = {name: [*rows] for name, rows in self._names.items()}
         return twin
 
@@ -85,26 +84,33 @@ class ConvexModel:
                 limit = bound[active]
                 key, where = (f"{name}.{side}", at[active]) if at is not None else ("", None)
                 row_size = max(size, float(np.max(np.abs(limit))))
-                self.nonpositive(sign * some - sign * limit, row_size, key, where, own_size(limit + origin, size))
+                self._below(sign * some - sign * limit, row_size, key, where, own_size(limit + origin, size))
         return x
 
     def variable(self, count: int) -> Affine:
+        self._asked[0].append(slice(self._count, self._count + count))
+        return self._unasked(count)
+
+    def _unasked(self, count: int) -> Affine:
         self._count += count
         return Affine.variables(self._count - count, count)
 
     def zero(self, residual: Any, size: float = 1.0) -> None:
-        self._equal.append(Affine.of(residual) / size)
+        self._asked[1].append(("equal", self._rows["equal"].add(Affine.of(residual) / size)))
 
     def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> None:
+        self._asked[1].append(("below", self._below(residual, size, name, at, own)))
+
+    def _below(self, residual: Any, size: float, name: str, at: Any, own: Any) -> slice:
         rows = Affine.of(residual) / size
         if rows.squares:  # bounded by variables: measured, with the cones on their own the duals are more exact
-            bound = self.variable(len(rows))
+            bound = self._unasked(len(rows))
             self._add_cones(*in_cones(rows.convex - bound))
             rows = rows.affine + bound
+        place = self._rows["below"].add(rows)
         if name:
-            self._names.setdefault(name, []).append((slice(self._last, self._last + len(rows)), size, at, own))
-        self._last += len(rows)
-        self._below.append(rows)
+            self._names.setdefault(name, []).append((place, size, at, own))
+        return place
 
     def times(self, factor: Any, x: Any) -> Any:
         return factor * x
@@ -125,19 +131,20 @@ class ConvexModel:
         return bound
 
     def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
-        self._add_cones(stacked([Affine.of(bound), Affine.of(x) * weights]), [len(weights) + 1])
+        place = self._add_cones(stacked([Affine.of(bound), Affine.of(x) * weights]), [len(weights) + 1])
+        self._asked[1].append(("inside", place))
 
-    def _add_cones(self, inside: Affine, sizes: list[int]) -> None:
-        self._inside.append(inside)
+    def _add_cones(self, inside: Affine, sizes: list[int]) -> slice:
         self._sizes += sizes
+        return self._rows["inside"].add(inside)
 
     def minimize(self, value: Any) -> None:
         value = Affine.of(value)
         self._objective = value.affine
         for _, weights, of in value.squares:
             if len(of.rows) > len(of):  # a sum of several gets a variable of its own: OSQP stalls without
-                own = self.variable(len(of))
-                self.zero(of - own)
+                own = self._unasked(len(of))
+                self._rows["equal"].add(of - own)
                 of = own
             self._objective = self._objective + of.squared().total(weights)
 
@@ -150,11 +157,12 @@ class ConvexModel:
     @cached_property
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
-        equal, below, inside = (stacked(rows) for rows in (self._equal, self._below, self._inside))
+        equal, below, inside = (stacked(rows.parts) for rows in self._rows.values())
         rows = stacked([equal, below, inside * -1.0])
         P, q, self._constant = self._objective.quadratic(self._count)
         A = sparse.csc_array(rows.matrix(self._count))
-        self._equal, self._below, self._inside = [], [], []  # the memory of large meshes
+        for kind in self._rows.values():
+            kind.parts = []  # the memory of large meshes
         return certificate.ConeProgram(P, q, A, -rows.constant, len(equal), len(below), tuple(self._sizes))
 
     def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
@@ -191,13 +199,15 @@ class ConvexModel:
             forgiven = _EXCESS * float(np.abs(z).sum())
         return Outcome(
             claim, status, value, iterations, ended - started, bound, forgiven,
-            self._prices(z[program.zero :]), (x, z), name.lower(), ended - solved,
+            self._prices(z[program.zero :]), self._pair(x, z), name.lower(), ended - solved,
         )  # fmt: skip
 
-    def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        x, z = pair
-        rows = (*(part.at(x) for part in self._equal + self._below), *(-part.at(x) for part in self._inside))
-        return float(self._objective.at(x)[0] + z @ np.concatenate(rows))
+    def _pair(self, x: Floats, z: Floats) -> Pair:
+        """The vectors of `trajopt.model.Pair`, from those of the program."""
+        first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
+        variables, rows = self._asked
+        dual = [z[first[kind] :][place] for kind, place in rows]
+        return Pair(np.concatenate([x[place] for place in variables]), np.concatenate(dual))
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:
         """The prices of named rows, from the multipliers of inequalities."""
@@ -210,6 +220,19 @@ class ConvexModel:
                 )
                 for name, rows in self._names.items()
             }
+
+
+@dataclass
+class _Rows:
+    """Rows of one kind, and how many there have been."""
+
+    parts: list[Affine] = field(default_factory=list)
+    count: int = 0
+
+    def add(self, rows: Affine) -> slice:
+        self.parts.append(rows)
+        self.count += len(rows)
+        return slice(self.count - len(rows), self.count)
 
 
 _EXCESS: Final = 1e-6  # of a row, which has size one: what a move that passes the check may exceed it by

@@ -14,8 +14,8 @@ from pyomo.common.modeling import unique_component_name
 from trajopt.along import Along, curved
 from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Outcome, Prices, own_size
-from trajopt.signals import Signal
+from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size
+from trajopt.signals import Smoothed
 
 _OPTIONS: Final = {
     "tol": 1e-10,
@@ -45,7 +45,7 @@ _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: 
 }
 
 
-class NonconvexModel:
+class NonconvexModel(Smoothed):
     """A nonlinear program under construction; see `trajopt.model.Model` for the meaning of the methods."""
 
     convex = False
@@ -54,6 +54,7 @@ class NonconvexModel:
         self._model = pyo.ConcreteModel()
         self._model.rows = pyo.ConstraintList()
         self._vectors: list[tuple[Any, Any, float]] = []
+        self._asked: list[Any] = []  # rows, in the order of the calls; None where there is nothing to decide
         self._named: list[tuple[str, list[Any], float, Floats, Floats]] = []
         self._contradiction = ""
         self._curves: list[Along] = []
@@ -109,11 +110,11 @@ class NonconvexModel:
             variables[k].set_value(min(scaled, np.inf if high is None else high))
 
     def zero(self, residual: Any, size: float = 1.0) -> None:
-        for row in np.atleast_1d(residual):
-            self._row(row, size, equality=True)
+        self._asked += [self._row(row, size, equality=True) for row in np.atleast_1d(residual)]
 
     def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> Any:
         rows = [self._row(row, size, equality=False) for row in np.atleast_1d(residual)]
+        self._asked += rows
         if name and None not in rows:
             self._named.append((name, rows, size, at, own))
 
@@ -146,13 +147,6 @@ class NonconvexModel:
         self.nonpositive(-x - bound)
         return bound
 
-    def raised(self, x: Any, exponent: float, size: float) -> tuple[Any, Any]:
-        """|x| to an exponent and its slope, from below: smoothed over 1e-4 of its size, with a convex function."""
-        square, smooth = x * x * (1 / size**2), 1e-8
-        value = (square + smooth) ** (exponent / 2) - smooth ** (exponent / 2)
-        slope = exponent * x * (square + smooth) ** (exponent / 2 - 1)
-        return size**exponent * value, size ** (exponent - 2) * slope
-
     def at_least_length(self, bound: Any, x: Any, weights: Floats) -> None:
         self.nonpositive(-bound)
         self.nonpositive(self.total(np.square(weights), x * x) - bound * bound)
@@ -167,7 +161,8 @@ class NonconvexModel:
         reach = (high - low) * _BEYOND
         count, span = len(position), high - low
         x = self.vector(count, span, np.full(count, low - reach), np.full(count, high + reach))
-        self.zero(position - x, span)
+        for row in position - x:
+            self._row(row, span, equality=True)
         found: list[Any] = []
         for curve, order in wanted:
             rows = np.array(curve.position)
@@ -178,19 +173,6 @@ class NonconvexModel:
             self._curves.append(Along(curve, order, position, self._vectors[-len(found) - 2], self._vectors[-1], lines))
             found.append(y)
         return found
-
-    def signs(self, signal: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
-        """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a signal over its size, smoothed
-        over w = 1e-3 so that Ipopt can follow."""
-
-        def smooth(values: Any) -> Any:
-            x = values * (1 / size)
-            return x / (x * x + 1e-6) ** 0.5
-
-        if signal.nodes is None:
-            return None, (smooth(signal.pieces[0]), smooth(signal.pieces[-1]))
-        nodes = smooth(signal.nodes)
-        return nodes, (nodes[:-1], nodes[1:])
 
     def minimize(self, value: Any) -> None:
         self._model.objective = pyo.Objective(expr=value)
@@ -219,7 +201,7 @@ class NonconvexModel:
         message = info["status_msg"].decode().partition(":")[0].partition(" (")[0]
         for variable, value in zip(nlp.get_pyomo_variables(), x, strict=True):
             variable.set_value(float(value), skip_validation=True)
-        seconds, pair = perf_counter() - started, (np.asarray(x), np.asarray(info["mult_g"]))
+        seconds, pair = perf_counter() - started, self._pair(nlp, info["mult_g"])
         prices = self._prices(nlp, info)
         return Outcome(claim, message, float(info["obj_val"]), deadline.iterations, seconds, prices=prices, pair=pair)
 
@@ -237,10 +219,13 @@ class NonconvexModel:
             found.setdefault(name, []).append((at, np.array(values) / size, own))
         return {name: Prices(*map(np.concatenate, zip(*parts, strict=True))) for name, parts in found.items()}
 
-    def lagrangian(self, pair: tuple[Floats, Floats]) -> float:
-        nlp, _, _ = self._interface(None)
-        nlp.set_primals(pair[0])
-        return float(nlp.evaluate_objective() + pair[1] @ nlp.evaluate_constraints())
+    def _pair(self, nlp: Any, multipliers: Floats) -> Pair:
+        """The vectors of `trajopt.model.Pair`, from Ipopt's multipliers and the values of the variables."""
+        of_row = {id(row): m for row, m in zip(nlp.get_pyomo_constraints(), multipliers, strict=True)}
+        dual = [of_row.get(id(row), 0.0) for row in self._asked]  # a row without variables has none
+        inner = {id(variables) for along in self._curves for _, variables, _ in (along.x, along.y)}
+        primal = [xs[k].value for _, xs, _ in self._vectors if id(xs) not in inner for k in xs]
+        return Pair(np.array(primal, dtype=float), np.array(dual))
 
     def _interface(self, seconds: float | None) -> tuple[Any, Any, _Deadline]:
         """The program as PyNumero and cyipopt see it; written once. Raises MissingSolver."""

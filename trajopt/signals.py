@@ -67,6 +67,30 @@ class OnFloats:
         return nodes, (nodes[:-1], nodes[1:])
 
 
+class Smoothed:
+    """What has corners, smoothed so that Ipopt can follow; on expressions and on floats."""
+
+    def raised(self, x: Any, exponent: float, size: float) -> tuple[Any, Any]:
+        """|x| to an exponent and its slope, from below: smoothed over 1e-4 of its size, with a convex function."""
+        square, smooth = x * x * (1 / size**2), 1e-8
+        value = (square + smooth) ** (exponent / 2) - smooth ** (exponent / 2)
+        slope = exponent * x * (square + smooth) ** (exponent / 2 - 1)
+        return size**exponent * value, size ** (exponent - 2) * slope
+
+    def signs(self, signal: Signal, size: float) -> tuple[Any, tuple[Any, ...]]:
+        """x/sqrt(x² + w²) at the nodes and at the ends of the intervals: the sign of a signal over its size, smoothed
+        over w = 1e-3."""
+
+        def smooth(values: Any) -> Any:
+            x = values * (1 / size)
+            return x / (x * x + 1e-6) ** 0.5
+
+        if signal.nodes is None:
+            return None, (smooth(signal.pieces[0]), smooth(signal.pieces[-1]))
+        nodes = smooth(signal.nodes)
+        return nodes, (nodes[:-1], nodes[1:])
+
+
 class BetweenReversals(OnFloats):
     """The arithmetic of arrays where no velocity changes its sign between nodes."""
 
