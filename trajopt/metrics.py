@@ -98,6 +98,8 @@ def peak(signal: Signal) -> float:
     pieces = np.stack(np.broadcast_arrays(*signal.pieces))
     best = float(np.max(np.abs(pieces[[0, -1]])))
     doubtful = pieces[:, np.max(np.abs(pieces), axis=0) > best]  # a polynomial lies within its coefficients
+    if not doubtful.size:
+        return best
     power = _power_form(doubtful)
     slope: Floats = np.asarray(polynomial.polyder(power))
     inside = polynomial.polyval(_roots_inside(slope), power[:, None], tensor=False)
@@ -159,7 +161,7 @@ def _roots_inside(power: Floats) -> Floats:
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
-    for n in range(1, len(power)):
+    for n in np.unique(degree[degree > 0]):
         columns = np.flatnonzero(degree == n)
         companion = np.zeros((len(columns), n, n))
         companion[:, 1:, :-1] = np.eye(n - 1)

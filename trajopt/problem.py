@@ -511,6 +511,28 @@ class Problem(Whole):
             return 0
         return 1 if velocity.lowest >= 0 else -1 if velocity.highest <= 0 else 0
 
+    @cached_property
+    def prescribed(self) -> tuple[tuple[float, int, float], ...]:
+        """(fraction of the duration, derivative, value) of every boundary and via condition; positions as displacement
+        from the start, or absolute where the start is free."""
+        from trajopt.preflight import at_time
+
+        move, duration = self.move, self.move.fixed_time
+        states: list[tuple[float, State, float | None]] = [(0.0, move.start, 0.0), (1.0, move.end, 0.0)]
+        states += [(via.time / (duration or 1.0), via, None) for via in move.via]
+        conditions = []
+        for fraction, state, default in states:
+            for i, value in state.fixed(self.order, default).items():
+                shift = (move.start_position or 0.0) if i == 0 and state.position is not None else 0.0
+                limit = getattr(self.limits, DERIVATIVES[i])
+                if limit is not None:  # by a rounding outside: farther ones have been refused
+                    low, high = at_time(limit, fraction * (duration or 0.0))
+                    value = min(max(value, low), high)
+                conditions.append((fraction, i, value - shift))
+        if not any(i == 0 for _, i, _ in conditions) and self.limits.position is None:
+            conditions.append((0.0, 0, 0.0))  # the move may be anywhere: let it start at zero
+        return tuple(conditions)
+
     @property
     def can_wait(self) -> bool:
         """Whether the axis may stand still at one end, so that more time never hurts; both positions are given."""

@@ -14,7 +14,6 @@ from trajopt.envelope import Envelope
 from trajopt.fields import Limit, Table
 from trajopt.mesh import LARGE, Floats, Mesh, mesh_for
 from trajopt.model import own_size
-from trajopt.preflight import at_time
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.quantities import Quantities
 from trajopt.scaling import Sizes, sizes_of
@@ -152,25 +151,9 @@ def hold(transcript: Transcript) -> None:
 
 
 def prescribed(problem: Problem, mesh: Mesh) -> list[tuple[int, int, float]]:
-    """(node, derivative, value) of every boundary and via condition; positions as displacement from the start, or
-    absolute where the start is free."""
-    move, order = problem.move, problem.order
-    origin = move.start_position or 0.0
-    states: list[tuple[int, Any, float | None]] = [(0, move.start, 0.0), (mesh.intervals, move.end, 0.0)]
-    for via in move.via:
-        states.append((mesh.node_at(via.time / (move.fixed_time or 1.0)), via, None))
-    conditions = []
-    for node, state, default in states:
-        for i, value in state.fixed(order, default).items():
-            shift = (origin if state.position is not None else 0.0) if i == 0 else 0.0
-            limit = getattr(problem.limits, DERIVATIVES[i])
-            if limit is not None:  # by a rounding outside: farther ones have been refused
-                low, high = at_time(limit, mesh.fractions[node] * (move.fixed_time or 0.0))
-                value = min(max(value, low), high)
-            conditions.append((node, i, value - shift))
-    if not any(i == 0 for _, i, _ in conditions) and problem.limits.position is None:
-        conditions.append((0, 0, 0.0))  # the move may be anywhere: let it start at zero
-    return conditions
+    """(node, derivative, value) of every boundary and via condition, as in `Problem.prescribed`."""
+    nodes = {0.0: 0, 1.0: mesh.intervals}
+    return [(nodes[at] if at in nodes else mesh.node_at(at), i, value) for at, i, value in problem.prescribed]
 
 
 def _variables(
