@@ -171,3 +171,9 @@ def test_interrupt_exits_130(move: Path) -> None:
     child.send_signal(signal.SIGINT)
     _, error = child.communicate(timeout=30)
     assert child.returncode == 130 and error.strip() == "trajopt: stopped by the user"
+
+
+def test_a_waiting_child_ends_with_its_parent() -> None:
+    script = "import os; from trajopt.worker import Apart; Apart(); print('waits', flush=True); os.kill(os.getpid(), 9)"
+    done = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, timeout=60)
+    assert done.returncode == -signal.SIGKILL and done.stdout == b"waits\n"  # the end of what both might write

@@ -48,18 +48,21 @@ def solve(
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem; exits 0 only with a checked answer."""
-    from trajopt import preflight, problem_file
-    from trajopt.worker import solve_apart
+    from trajopt.worker import Apart
 
     _refuse_seconds(seconds)
-    problem = problem_file.load(source, [*overrides, *(["transcription.tighten=true"] if tighten else [])])
-    if animate and (output is None or getattr(problem, "arm", None) is None):
-        need = "needs a folder to write into; give --output" if output is None else "this problem has no arm to draw"
-        raise BadInput(f"--animate: {need}")
-    _make_folder(output)
-    for warning in preflight.warnings(problem):
-        print(f"warning: {warning}", file=sys.stderr)
-    solution = solve_apart(problem, seconds)
+    with Apart() as child:
+        from trajopt import preflight, problem_file, report
+
+        problem = problem_file.load(source, [*overrides, *(["transcription.tighten=true"] if tighten else [])])
+        if animate and (output is None or getattr(problem, "arm", None) is None):
+            missing = output is None
+            need = "needs a folder to write into; give --output" if missing else "this problem has no arm to draw"
+            raise BadInput(f"--animate: {need}")
+        _make_folder(output)
+        for warning in preflight.warnings(problem):
+            print(f"warning: {warning}", file=sys.stderr)
+        solution = child.solve(problem, seconds)
     written = solution.save(output) if output is not None else []
     if animate and solution.status.solved:
         written.append(cast("AxesSolution", solution).animate(cast(Path, output) / "motion.gif"))
@@ -67,11 +70,9 @@ def solve(
         compared = solution.comparison() if solution.status.solved else []
         print(json.dumps(solution.sealed(comparison=compared), allow_nan=False))
     else:
-        from trajopt.report import print_solution, print_timings
-
-        print_solution(solution)
+        report.print_solution(solution)
         if timings:
-            print_timings(solution)
+            report.print_timings(solution)
         for path in written:
             print(f"wrote {path}")
     raise typer.Exit(solution.status.exit_code)

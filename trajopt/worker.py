@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, overload
 
 from trajopt.errors import BadInput
 from trajopt.problem import Problem
-from trajopt.routing import route
 from trajopt.solution import Solution
 from trajopt.verdict import Verdict
 
@@ -59,33 +58,52 @@ def solve_apart(problem: AxesProblem, seconds: float | None = None) -> AxesSolut
 def solve_apart(
     problem: Problem | PlantProblem | AxesProblem, seconds: float | None = None
 ) -> Solution | PlantSolution | AxesSolution:
-    """`trajopt.solve` in a child process, which is ended at the limit (LIMIT) and on Ctrl-C; its death is CRASHED.
+    """`solve` in a child process, with a limit or without."""
+    import trajopt.solving  # noqa: F401 (once here, and not in every child)
 
-    Raises what `trajopt.solve` raises, and KeyboardInterrupt.
-    """
-    context = multiprocessing.get_context("fork")
-    receiver, sender = context.Pipe(duplex=False)
-    child = context.Process(target=_work, args=(sender, problem, seconds), daemon=True)
-    child.start()
-    sender.close()
-    before = _end_with_us()
-    try:
-        if receiver.poll(None if seconds is None else seconds + GRACE):
-            answer = receiver.recv()
-            child.join()
-        else:
-            return _ended(problem, Verdict.LIMIT, f"stopped after {seconds:g} s")
-    except EOFError:
-        child.join()
-        return _ended(problem, Verdict.CRASHED, f"the solver process ended with code {child.exitcode}")
-    finally:
-        child.kill()
-        if before is not None:
-            signal.signal(signal.SIGTERM, before)
-    if isinstance(answer, BaseException):
-        raise answer
-    found: Solution | PlantSolution | AxesSolution = answer
-    return found
+    with Apart() as child:
+        return child.solve(problem, seconds)
+
+
+class Apart:
+    """A child process that solves one problem; it loads what that takes while its parent still reads the problem.
+    It is ended at the limit (LIMIT), on Ctrl-C and with the block that it is used in; its own death is CRASHED."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("fork")
+        self._pipe, there = context.Pipe()
+        self._child = context.Process(target=_work, args=(there, self._pipe), daemon=True)
+        self._child.start()
+        there.close()
+        self._before = _end_with_us()
+
+    def solve(
+        self, problem: Problem | PlantProblem | AxesProblem, seconds: float | None = None
+    ) -> Solution | PlantSolution | AxesSolution:
+        """`trajopt.solve`, once. Raises what that raises, and KeyboardInterrupt."""
+        try:
+            self._pipe.recv()  # it is ready: what it loads does not count
+            self._pipe.send((problem, seconds))
+            if not self._pipe.poll(None if seconds is None else seconds + GRACE):
+                return _ended(problem, Verdict.LIMIT, f"stopped after {seconds:g} s")
+            answer = self._pipe.recv()
+        except (EOFError, ConnectionError):
+            self._child.join()
+            return _ended(problem, Verdict.CRASHED, f"the solver process ended with code {self._child.exitcode}")
+        if isinstance(answer, BaseException):
+            raise answer
+        found: Solution | PlantSolution | AxesSolution = answer
+        return found
+
+    def __enter__(self) -> Apart:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._child.kill()
+        self._child.join()
+        self._pipe.close()
+        if self._before is not None:
+            signal.signal(signal.SIGTERM, self._before)
 
 
 def solve_here(
@@ -118,16 +136,24 @@ def _end_with_us() -> Any:
     return signal.signal(signal.SIGTERM, unwind)
 
 
-def _work(sender: Connection, problem: Problem | PlantProblem | AxesProblem, seconds: float | None) -> None:
+def _work(pipe: Connection, end_of_parent: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_of_parent.close()  # so that the parent's death is heard
+    import trajopt.solving  # noqa: F401
+
+    pipe.send("ready")
+    try:
+        problem, seconds = pipe.recv()
+    except EOFError:
+        return
     answer: Any
     try:
         answer = solve_here(problem, seconds)
     except Exception as error:
         error.add_note(_trace())
         answer = error
-    sender.send(answer)
+    pipe.send(answer)
 
 
 def _trace() -> str:
@@ -139,6 +165,8 @@ def _trace() -> str:
 def _ended(
     problem: Problem | PlantProblem | AxesProblem, verdict: Verdict, message: str
 ) -> Solution | PlantSolution | AxesSolution:
+    from trajopt.routing import route
+
     if isinstance(problem, Problem):
         return Solution(verdict, problem, route(problem), message=message)
     from trajopt.axes.problem import AxesProblem
