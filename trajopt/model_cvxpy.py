@@ -207,7 +207,7 @@ class ConvexModel:
         first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
         variables, rows = self._asked
         dual = [z[first[kind] :][place] for kind, place in rows]
-        return Pair(np.concatenate([x[place] for place in variables]), np.concatenate(dual))
+        return Pair(np.concatenate([x[place] for place in variables]), np.concatenate([np.empty(0), *dual]))
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:
         """The prices of named rows, from the multipliers of inequalities."""
