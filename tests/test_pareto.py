@@ -24,6 +24,7 @@ from trajopt.fronts.geometry import Outside
 from trajopt.fronts.output import FORMAT
 from trajopt.fronts.plot import plot_front
 from trajopt.fronts.scalarise import Answer, Plane
+from trajopt.fronts.search import halvings
 from trajopt.fronts.tracing import prepare
 from trajopt.workers import Here
 
@@ -305,7 +306,7 @@ def _uncertified(data: dict[str, Any]) -> None:
 
 
 def _more_blends(data: dict[str, Any]) -> None:
-    data["blends"] = 1
+    data["blends"] = [1] * len(data["blends"])
 
 
 @pytest.mark.parametrize(
@@ -421,3 +422,13 @@ def test_bad_ceilings_are_refused_in_one_line(ceiling: str, words: tuple[str, ..
     with pytest.raises(trajopt.BadInput) as refused:
         parse(TABLE_I.replace('norm     = "l2"', f'norm = "l2"\nceilings = [{ceiling}]'))
     assert all(word in str(refused.value) for word in words)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 9, 49])
+def test_halvings_reach_every_place_once_and_neighbours_come_first(count: int) -> None:
+    known, widest = [0.0, 1.0], count + 1
+    for shares in halvings(count):
+        known = sorted([*known, *shares])
+        widest = (widest + 1) // 2
+        assert max(np.diff(known)) * (count + 1) == pytest.approx(widest)
+    assert known == pytest.approx(np.linspace(0, 1, count + 2), abs=1e-15)

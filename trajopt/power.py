@@ -41,9 +41,10 @@ _WORTH: Final = 0.02  # of a gap: a bound that could rise by less is not raised
 _WIDE: Final = 5e-3  # relative gap: wider ones may come from a descent that started badly
 
 
-def optimum(setting: Setting, clock: Clock) -> tuple[Attempt, Attempt]:
-    """The relaxation with its bound, and the answer of a descent; the relaxation twice where it has no trajectory."""
-    if _is_quadratic(setting.problem) and (found := _between_tangents(setting, clock)) is not None:
+def optimum(setting: Setting, clock: Clock, start: Trajectory | None = None) -> tuple[Attempt, Attempt]:
+    """The relaxation with its bound, and the answer of a descent, from ``start`` where the descent goes first; the
+    relaxation twice where it has no trajectory."""
+    if _is_quadratic(setting.problem) and (found := _between_tangents(setting, clock, start)) is not None:
         return found
     relaxed = relax(setting, clock)
     return relaxed, relaxed if relaxed.trajectory is None else descend(setting, relaxed.trajectory, clock)
@@ -73,9 +74,9 @@ def _is_quadratic(problem: Problem) -> bool:
     return problem.order == 3 and placed and not electrical and not beyond_quadratic(problem)
 
 
-def _between_tangents(setting: Setting, clock: Clock) -> tuple[Attempt, Attempt] | None:
+def _between_tangents(setting: Setting, clock: Clock, start: Trajectory | None) -> tuple[Attempt, Attempt] | None:
     """As `optimum`, by tangents; None where the bound stays far off, or a program fails."""
-    start = _guess(setting)
+    start = _guess(setting) if start is None else start
     if setting.problem.objective.ceilings:  # with power linearised so far off they could not be kept
         relaxed = relax(setting, clock, [Touch.at(start)])
         if relaxed.trajectory is None:

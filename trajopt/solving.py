@@ -94,7 +94,7 @@ def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution
     elif _is_affine(problem):
         solution, attempt = _convex(setting, lean, chosen, clock)
     else:
-        solution, attempt = _by_descent(setting, lean, chosen, clock)
+        solution, attempt = _by_descent(setting, lean, chosen, clock, start)
     ended = attempt.trajectory is None and attempt.outcome.claim in (Claim.INFEASIBLE, Claim.LIMIT)
     if solution.status.solved or lean is setting or ended:
         return solution
@@ -207,9 +207,11 @@ def _shortest_candidates(
         yield attempt, chosen
 
 
-def _by_descent(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
+def _by_descent(
+    setting: Setting, lean: Setting, chosen: Route, clock: Clock, start: Trajectory | None
+) -> tuple[Solution, Attempt]:
     """Power or energy: a descent by convex programs, or by Ipopt where it does not settle, and a relaxation's bound."""
-    relaxed, answer = optimum(lean, clock)
+    relaxed, answer = optimum(lean, clock, start)
     if relaxed.trajectory is None:
         return conclude(setting, chosen, relaxed, clock), relaxed
     candidates = []

@@ -174,7 +174,7 @@ def _error_checks(front: _Front, stated: Mapping[str, Any], notes: list[str]) ->
         notes.append("the error of the front (none is stated)")
         claims = stated["status"] == "SOLVED" and asked is not None
         return [question("error", "SOLVED, but the error asked for is not certified" if claims else "")]
-    ours = _error(front, bool(stated["convex"]), int(stated["blends"]))
+    ours = _error(front, bool(stated["convex"]), [int(count) for count in stated["blends"]])
     if ours is None:
         notes.append("the error of the front: too many corners to look at")
         return []
@@ -184,7 +184,7 @@ def _error_checks(front: _Front, stated: Mapping[str, Any], notes: list[str]) ->
     return [*checks, question("error as asked", f"{error!r} is more than {asked!r}" if late else "")]
 
 
-def _error(front: _Front, convex: bool, blends: int) -> float | None:
+def _error(front: _Front, convex: bool, blends: list[int]) -> float | None:
     """The most by which any move may be better than all that was achieved, in every objective, normalised."""
     points = (front.values - front.low) / front.size
     if convex:
@@ -253,11 +253,12 @@ def _normals(points: Array) -> Array:
     return np.vstack(found)
 
 
-def _blended(front: _Front, count: int) -> list[Array]:
-    """The objectives of moves blended of neighbours, SI; of those that keep the limits that are not convex."""
+def _blended(front: _Front, counts: list[int]) -> list[Array]:
+    """The objectives of moves blended of neighbours, so many of each two; SI, and of those that keep the limits that
+    are not convex. Without counts there are none."""
     order = sorted(range(front.kept), key=lambda k: tuple(front.values[k]))
     found = []
-    for i, j in zip(order, order[1:], strict=False):
+    for i, j, count in zip(order, order[1:], counts, strict=False):
         if front.cases[i].end_time != front.cases[j].end_time:
             continue  # moves of different durations cannot be blended
         first, second = front.cases[i], front.cases[j]

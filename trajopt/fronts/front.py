@@ -66,7 +66,7 @@ class Front:
     ``points``: the nondominated ones, by the first objective; ``dropped``: dominated ones; ``unsolved``: solutions
     without a move. ``planes`` and ``corners`` bound the front from outside (see `trajopt.fronts.geometry`), SI.
     ``error``: how well the front is known, in shares of the ranges between the anchors, None where no bound is known;
-    ``asked``: how well it should be. ``blends``: how many moves between neighbours were measured to know it.
+    ``asked``: how well it should be. ``blends``: how many moves between each two neighbours were measured to know it.
     ``status``: SOLVED when every point is solved and the asked error is certified, else UNDECIDED, and ``message`` says
     which is lacking.
     """
@@ -81,7 +81,7 @@ class Front:
     planes: tuple[Plane, ...] = ()
     corners: tuple[tuple[float, ...], ...] = ()
     convex: bool = False
-    blends: int = 0
+    blends: tuple[int, ...] = ()
     error: float | None = None
     asked: float | None = None
     ideal: tuple[float, ...] = ()

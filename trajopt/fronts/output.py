@@ -59,7 +59,7 @@ def to_dict(front: Front) -> dict[str, Any]:
         "error": front.error,
         "asked": front.asked,
         "convex": front.convex,
-        "blends": front.blends,
+        "blends": list(front.blends),
         "ideal": list(front.ideal),
         "nadir": list(front.nadir),
         "anchors": list(front.anchors),

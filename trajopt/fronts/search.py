@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
 from time import perf_counter
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,13 +18,14 @@ from trajopt.fronts.geometry import Gap, Outside
 from trajopt.fronts.scalarise import Answer, Task, answer, is_convex
 from trajopt.mesh import Floats
 from trajopt.problem import Problem, Term
+from trajopt.trajectory import Trajectory
 from trajopt.verdict import Verdict
 from trajopt.workers import Here, Processes
 
 MOST: Final = 200  # solves
 _SAME: Final = 1e-6  # weights, normalised, and points this close are one
 _LEAST: Final = 1e-3  # weight, of the largest: with none at all the others could be anything
-_BLENDS: Final = 64  # at least, between two neighbours
+_BLENDS: Final = 256  # at least, along the range of an objective
 
 Progress = Callable[[int, "float | None"], None]
 
@@ -46,7 +49,7 @@ class Search:
         self.answers: list[Answer] = []
         self.convex = is_convex(problem)
         self._hands, self._progress = hands, progress
-        self._count = _BLENDS if request.error is None else int(np.clip(0.32 / request.error, _BLENDS, 2048))
+        self._fine = _BLENDS if request.error is None else float(np.clip(2.5 / request.error, _BLENDS, 8192))
         self._blended: dict[tuple[int, int], Floats] = {}
         self._asked: list[Floats] = []
         self._started = perf_counter()
@@ -56,7 +59,8 @@ class Search:
         size, request = len(self.terms), self.request
         self._solve([Task(self.problem, self.terms, "anchor", minimized=k) for k in range(size)])
         if request.points is not None and size == 2:
-            self._solve(self._evenly(request.points - 2))
+            for shares in halvings(request.points - 2):
+                self._solve(self._evenly(shares))
         while tasks := self._next():
             self._solve(tasks)
         return self.front()
@@ -69,22 +73,32 @@ class Search:
                 self._progress(len(self.answers) + len(found), None)
         finally:  # in the order of the tasks, whoever was first
             self.answers += [found[k] for k in sorted(found)]
-        self._progress(len(self.answers), self.error())
 
-    def _evenly(self, count: int) -> list[Task]:
-        shares = np.arange(1, count + 1) / (count + 1)
+    def _evenly(self, shares: Sequence[float]) -> list[Task]:
+        """The tasks at these fractions of the way between the anchors."""
         if self.request.method == "weights":
-            return [self._task("weights", weights=(float(w), float(1 - w))) for w in shares]
-        ends = [x.values[0] for x in self.answers if x.values is not None]
+            return [self._task("weights", weights=(w, 1 - w)) for w in shares]
+        ends = [x.values[0] for x in self.answers if x.values is not None and x.task.kind == "anchor"]
         if len(ends) < 2:
             return []
-        return [self._ceiling(min(ends) + float(s) * (max(ends) - min(ends))) for s in shares]
+        return [self._ceiling(min(ends) + s * (max(ends) - min(ends))) for s in shares]
 
     def _task(self, kind: str, weights: tuple[float, ...] = (), ceilings: tuple[float | None, ...] = ()) -> Task:
         minimized = ceilings.index(None) if ceilings else 0
-        nearest = max(range(len(weights)), key=lambda k: weights[k], default=minimized)
-        starts = [x.solution.trajectory for x in self.answers if x.task.minimized == nearest]
-        return Task(self.problem, self.terms, kind, weights, minimized, ceilings, starts[0] if starts else None)
+        return Task(self.problem, self.terms, kind, weights, minimized, ceilings, self._nearest(weights, ceilings))
+
+    def _nearest(self, weights: tuple[float, ...], ceilings: tuple[float | None, ...]) -> Trajectory | None:
+        """The move of the answer whose weights, or whose values under the ceilings, are most like these."""
+
+        def apart(found: Answer) -> float:
+            assert found.values is not None and found.weights is not None
+            pairs: Any = zip(weights, np.array(found.weights) / sum(found.weights), strict=True)
+            if ceilings:
+                pairs = ((most, value) for most, value in zip(ceilings, found.values, strict=True) if most is not None)
+            return max(abs(asked - there) for asked, there in pairs)
+
+        known = [x for x in self.answers if x.values is not None and x.weights is not None]
+        return min(known, key=apart).solution.trajectory if known else None
 
     def _ceiling(self, most: float) -> Task:
         return self._task("epsilon", ceilings=(most, None))
@@ -94,7 +108,9 @@ class Search:
         target, points = self.request.error or 0.0, self.request.points
         if (points is not None and (len(self.terms) == 2 or len(self.answers) >= points)) or len(self.answers) >= MOST:
             return []
-        wide = [gap for gap in self.gaps() if gap.error > max(target, 1e-9) and np.isfinite(gap.error)]
+        gaps = self.gaps()
+        self._progress(len(self.answers), _widest(gaps))
+        wide = [gap for gap in gaps if gap.error > max(target, 1e-9) and np.isfinite(gap.error)]
         tasks = [task for gap in wide if (task := self._into(gap)) is not None]
         return tasks[: (points or MOST) - len(self.answers)]
 
@@ -162,8 +178,7 @@ class Search:
             return geometry.hull_gaps(y, beyond)
         if len(self.terms) > 2:
             return geometry.point_gaps(y, beyond)
-        pairs = zip(points, points[1:], strict=False)
-        between = [(self._between(p, q) - ideal) / ranges(ideal, nadir) for p, q in pairs]
+        between = [(self._between(p, q) - ideal) / ranges(ideal, nadir) for p, q in pairwise(points)]
         return geometry.staircase_gaps(y, between, beyond)
 
     def _between(self, first: Point, second: Point) -> Floats:
@@ -171,13 +186,23 @@ class Search:
         if key not in self._blended:
             moves = first.solution.trajectory, second.solution.trajectory
             assert moves[0] is not None and moves[1] is not None
-            self._blended[key] = blends(moves[0], moves[1], self.terms, self._count)
+            self._blended[key] = blends(moves[0], moves[1], self.terms, self._count(first, second))
         return self._blended[key]
+
+    def _count(self, first: Point, second: Point) -> int:
+        """How many moves to blend of two neighbours: the more, the farther they lie apart."""
+        apart = np.abs(np.subtract(second.values, first.values)) / ranges(*self._ends)
+        return ceil(self._fine * float(np.max(apart)))
+
+    def _counts(self) -> tuple[int, ...]:
+        """Of each two neighbours; none where blends play no part."""
+        if self.convex or len(self.terms) > 2 or not self._fine:
+            return ()
+        return tuple(self._count(p, q) for p, q in pairwise(self._points()))
 
     def error(self) -> float | None:
         """How well the front is known; None where no bound is."""
-        gaps = self.gaps()
-        return max(gaps[0].error, 0.0) if gaps and np.isfinite(gaps[0].error) else None
+        return _widest(self.gaps())
 
     def front(self, interrupted: bool = False) -> Front:
         """What is known by now."""
@@ -193,7 +218,7 @@ class Search:
             tuple(point for point, kept in found if kept), tuple(point for point, kept in found if not kept), unsolved,
             tuple(plane for x in self.answers for plane in x.planes),
             tuple(corner for x in self.answers for corner in x.corners),
-            self.convex, 0 if self.convex or len(self.terms) > 2 else self._count,
+            self.convex, self._counts(),
             error, self.request.error, ideal, nadir, len(self.answers), {"total": perf_counter() - self._started},
         )  # fmt: skip
 
@@ -209,3 +234,15 @@ class Search:
             return Verdict.UNDECIDED, "no lower bound is known for these objectives: the error cannot be certified"
         text = f"known within {100 * error:.2g} %, not the {100 * asked:.2g} % asked for"
         return Verdict.UNDECIDED, f"{text}: closer, the lower bounds are too loose, or {MOST} solves too few"
+
+
+def _widest(gaps: Sequence[Gap]) -> float | None:
+    return max(gaps[0].error, 0.0) if gaps and np.isfinite(gaps[0].error) else None
+
+
+def halvings(count: int) -> Iterator[list[float]]:
+    """``count`` fractions evenly inside (0, 1), in rounds that halve what is left between those before."""
+    ends, size = [0, count + 1], count + 1
+    while middles := [(a + b) // 2 for a, b in pairwise(ends) if b - a > 1]:
+        yield [k / size for k in middles]
+        ends = sorted([*ends, *middles])
