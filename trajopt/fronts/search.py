@@ -95,7 +95,7 @@ class Search:
             pairs: Any = zip(weights, np.array(found.weights) / sum(found.weights), strict=True)
             if ceilings:
                 pairs = ((most, value) for most, value in zip(ceilings, found.values, strict=True) if most is not None)
-            return max(abs(asked - there) for asked, there in pairs)
+            return float(max(abs(asked - there) for asked, there in pairs))
 
         known = [x for x in self.answers if x.values is not None and x.weights is not None]
         return min(known, key=apart).solution.trajectory if known else None
