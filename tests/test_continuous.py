@@ -9,6 +9,7 @@ import pytest
 import trajopt
 from tests.conftest import axis, solved, table_i
 from trajopt import continuous
+from trajopt.transcribe import Setting
 
 SERVO = {  # reference energies, J; peak speed, rad/s; arcs and switch times, s
     "servomotor_case_1": (
@@ -51,6 +52,20 @@ def test_the_axis_of_table_i(minimize: str, norm: str | None, optimum: float) ->
     assert 0 < finer["above_continuous"] < certificate["above_continuous"] / 2
 
 
+@pytest.mark.parametrize(("minimize", "norm", "optimum"), TABLE_I)
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_move_of_an_optimum_has_its_value_and_goes_there(
+    minimize: str, norm: str | None, optimum: float, way: float
+) -> None:
+    limits = {"velocity": (0.0, 0.5) if way > 0 else (-0.5, 0.0), "acceleration": 4.905, "jerk": 98.1}
+    problem = axis(minimize, norm, distance=way * 0.254, limits=limits, load={"inertia": 10.0}, intervals=2000)
+    known = continuous.mass_optimum(problem)
+    assert known is not None and known.value == pytest.approx(optimum, rel=1e-9)
+    move = known.on(Setting.of(problem))
+    assert move.chain[0][-1] == pytest.approx(way * 0.254, rel=2e-4)
+    assert move.measure(problem.objective) == pytest.approx(optimum, rel=1e-3)
+
+
 def test_backwards_is_forwards() -> None:
     limits = {"acceleration": 4.905, "jerk": 98.1}
     given: dict[str, Any] = {"load": {"inertia": 10.0}, "intervals": 40}
@@ -78,7 +93,7 @@ def test_an_answer_below_the_optimum_is_our_bug() -> None:
     assert solution.trajectory is not None
     lie = {**solution.metrics, "energy": 0.81}
     with pytest.raises(trajopt.InternalError, match="below the optimum in continuous time"):
-        continuous.findings(solution.problem, solution.trajectory, lie)
+        continuous.findings(solution.problem, solution.trajectory, lie, continuous.mass_optimum(solution.problem))
 
 
 def test_arcs_are_read_off_the_trajectory_where_the_optimum_is_not_known() -> None:

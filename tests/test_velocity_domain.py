@@ -13,6 +13,7 @@ from trajopt.velocity_domain import (
     least_peak_power,
     least_square_power,
     minimum_time,
+    over_time,
     power_within,
 )
 
@@ -37,6 +38,21 @@ def test_optima_on_the_axis_of_table_i() -> None:
     assert lowest.power == pytest.approx(1.681495190894, rel=1e-11)
     assert lowest.energy == pytest.approx(1.591403924, rel=1e-9)
     assert least_square_power(TABLE_I).value == pytest.approx(1.8564080358, rel=1e-10)
+
+
+def test_the_moves_of_optima_over_time() -> None:
+    time = np.linspace(0.0, TABLE_I.duration, 20_001)
+    lowest, square = least_peak_power(TABLE_I), least_square_power(TABLE_I)
+    for ramps, peak in ((TABLE_I.shortest(lowest.peak, lowest.power), lowest.peak), (square.ramps, square.peak)):
+        v, a = over_time(ramps, TABLE_I.duration, time)
+        assert np.trapezoid(v, time) == pytest.approx(TABLE_I.distance, rel=2e-4)
+        assert np.max(v) == pytest.approx(peak, rel=1e-4) and v[0] == v[-1] == 0.0
+        assert np.max(np.abs(np.cumsum(a) * time[1] - v)) < 1e-3 * peak
+        power = TABLE_I.mass * np.abs(a * v)
+        if ramps is square.ramps:
+            assert np.trapezoid(power**2, time) == pytest.approx(square.value, rel=1e-4)
+        else:
+            assert np.max(power) == pytest.approx(lowest.power, rel=1e-4)
 
 
 def test_the_front_of_energy_and_peak_power() -> None:

@@ -9,7 +9,7 @@ the necessary conditions. Other moves of a motor have their arcs read off the tr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from math import inf, isfinite, sqrt
 from typing import Any, Final
@@ -18,8 +18,11 @@ import numpy as np
 
 from trajopt import velocity_domain as vd
 from trajopt.errors import InternalError
+from trajopt.fields import Limit
+from trajopt.mesh import Floats
 from trajopt.problem import Problem
 from trajopt.trajectory import Trajectory
+from trajopt.transcribe import Setting
 
 _BELOW: Final = 1e-6  # relative: an answer this far below the optimum contradicts it
 _ZERO: Final = 1e-3  # of the peak current: below it the control counts as zero
@@ -27,24 +30,57 @@ _AT: Final = 1e-6  # relative: this close to a limit is on it
 _PROVEN: Final = ("energy", "power linf")  # of the others, the best peak speed comes from a search on a grid
 
 
+@dataclass(frozen=True)
+class MassOptimum:
+    """What is least for a mass, in the unit of the objective's signal, and the ramps of the move that takes it."""
+
+    value: float
+    ramps: tuple[vd.Ramp, vd.Ramp]
+
+    def on(self, setting: Setting) -> Trajectory:
+        """The move at the nodes of a mesh, to linearise power at; between them it is nearly one."""
+        problem, mesh, scheme, sizes = setting.problem, setting.mesh, setting.scheme, setting.sizes
+        duration = problem.move.fixed_time or 0.0
+        steps = mesh.steps * duration
+        found = vd.over_time(self.ramps, duration, mesh.fractions * duration)
+        speed, acceleration = (problem.one_way * x for x in found)
+        position = np.concatenate([[0.0], np.cumsum(steps * (speed[1:] + speed[:-1]) / 2)])
+        chain: tuple[Floats, ...] = (position, speed, acceleration, np.diff(acceleration) / steps)
+        if problem.order == 2:
+            chain = (position, speed, np.diff(speed) / steps)
+        return Trajectory(problem, mesh, scheme, sizes, duration, problem.move.start_position or 0.0, chain)
+
+
+def mass_optimum(problem: Problem) -> MassOptimum | None:
+    """The optimum in continuous time of a mass without friction, under limits of velocity, acceleration and jerk, for
+    what its power is; None for other problems. A power limit plays no part in it."""
+    if len(problem.objective.all_terms) != 1 or not _one_way_rest_to_rest(problem) or not _mass_alone(problem):
+        return None
+    try:
+        return _mass_optimum(problem)
+    except (ValueError, RuntimeError):  # time too short for it, or not met to a billionth: nothing is claimed
+        return None
+
+
 def findings(
-    problem: Problem, trajectory: Trajectory, metrics: Mapping[str, float]
+    problem: Problem, trajectory: Trajectory, metrics: Mapping[str, float], mass: MassOptimum | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What joins the certificate and the structure of a solved problem: both empty where nothing is known.
+    """What joins the certificate and the structure of a solved problem, whose `mass_optimum` is ``mass``: both empty
+    where nothing is known.
 
     Raises InternalError when an answer is better than an optimum in continuous time that is proven.
     """
     if len(problem.objective.all_terms) != 1 or not _one_way_rest_to_rest(problem):
         return {}, _on_mesh(trajectory)
-    try:
-        if _motor_alone(problem):
+    if mass is not None and _is_idle(problem.limits.power, metrics):
+        return _certificate(problem, mass.value, metrics), _on_mesh(trajectory)
+    if _motor_alone(problem):
+        try:
             optimum = _servo(problem)
-            if certificate := _certificate(problem, optimum.energy, metrics):
-                return certificate, _structure(optimum)
-        if _mass_alone(problem, metrics):
-            return _certificate(problem, _power(problem), metrics), _on_mesh(trajectory)
-    except (ValueError, RuntimeError):  # time too short for it, or not met to a billionth: nothing is claimed
-        pass
+        except (ValueError, RuntimeError):  # as above
+            return {}, _on_mesh(trajectory)
+        if certificate := _certificate(problem, optimum.energy, metrics):
+            return certificate, _structure(optimum)
     return {}, _on_mesh(trajectory)
 
 
@@ -93,14 +129,16 @@ def _motor_alone(problem: Problem) -> bool:
     return wanted and problem.order == 2 and set(problem.limits.given) <= known
 
 
-def _mass_alone(problem: Problem, metrics: Mapping[str, float]) -> bool:
-    """A mass without friction, under limits of velocity, acceleration and jerk, for what its power is; a power limit
-    that the answer does not meet is none."""
-    power = problem.limits.power
-    idle = power is not None and metrics["peak_power"] < min(power.highest, -power.lowest) * (1 - 1e-3)
-    known = {"velocity", "acceleration", "jerk", *(("power",) if idle else ())}
+def _mass_alone(problem: Problem) -> bool:
+    """A mass without friction for what its power is; of limits, those of velocity, acceleration, jerk and power."""
     load, wanted = problem.load, problem.objective.terms[0].label in ("energy", "power linf", "power l2")
+    known = {"velocity", "acceleration", "jerk", "power"}
     return wanted and not (load.viscous or load.coulomb) and problem.order <= 3 and set(problem.limits.given) <= known
+
+
+def _is_idle(power: Limit | None, metrics: Mapping[str, float]) -> bool:
+    """Whether a power limit is none to a move: one that stays below it."""
+    return power is None or metrics["peak_power"] < min(power.highest, -power.lowest) * (1 - 1e-3)
 
 
 def _ways(problem: Problem, name: str) -> tuple[float, float]:
@@ -125,7 +163,7 @@ def _servo(problem: Problem) -> vd.ServoOptimum:
     return vd.optimum(motor, _distance(problem), problem.move.fixed_time or 0.0, limits, objective)
 
 
-def _power(problem: Problem) -> float:
+def _mass_optimum(problem: Problem) -> MassOptimum:
     duration, mass = problem.move.fixed_time or 0.0, problem.load.inertia
     assert isinstance(mass, float)
     faster, slower = _ways(problem, "acceleration")
@@ -133,10 +171,13 @@ def _power(problem: Problem) -> float:
     axis = vd.Axis(mass, _distance(problem), duration, _ways(problem, "velocity")[0], faster, slower, jerk)
     label = problem.objective.terms[0].label
     if label == "energy":
-        return vd.least_energy(axis)
+        peak = vd.least_peak(axis)
+        return MassOptimum(mass * peak**2, axis.shortest(peak))
     if label == "power linf":
-        return vd.least_peak_power(axis).power
-    return sqrt(vd.least_square_power(axis).value / duration)
+        found = vd.least_peak_power(axis)
+        return MassOptimum(found.power, axis.shortest(found.peak, found.power))
+    square = vd.least_square_power(axis)
+    return MassOptimum(sqrt(square.value / duration), square.ramps)
 
 
 def _structure(optimum: vd.ServoOptimum) -> dict[str, Any]:

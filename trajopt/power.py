@@ -2,8 +2,9 @@
 
 Programs with the power linearised at the last move descend to a local optimum: every point between two feasible moves
 is feasible. Where the relaxation is a linear or quadratic program but for its squares, the descent comes first, from a
-guess, and tangents at its answer stand in for the squares: several times as fast, and bounding nearly as well, as the
-best moves of both are nearly one. Elsewhere the relaxation is a cone program, and the descent starts from its answer.
+neighbour's move, the optimum in continuous time or a guess, and tangents at its answer stand in for the squares:
+several times as fast, and bounding nearly as well, as the best moves of both are nearly one. Elsewhere the relaxation
+is a cone program, and the descent starts from its answer.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import numpy as np
 import norms
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, rungs, smoothest, to, unlimited
 from trajopt.conclude import KEPT, conclude, first_solved
-from trajopt.continuous import findings
+from trajopt.continuous import MassOptimum, findings, mass_optimum
 from trajopt.explain import explain_power, tested
 from trajopt.model import Claim, Outcome
 from trajopt.power import linearised, optimum, relax
@@ -35,14 +35,17 @@ _ROUNDS = 4  # of drawing in
 
 
 def solve(problem: Problem, seconds: float | None = None, start: Trajectory | None = None) -> Solution:
-    """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only. A local
-    solver that would try several starts takes ``start``, the answer of a neighbouring problem, alone."""
+    """`trajopt.worker.solve` in this process, where ``seconds`` is kept between and within solver runs only. ``start``:
+    the answer of a neighbouring problem, from which a descent starts, and a local solver that would try several."""
     clock = Clock(seconds)
-    solution = _solve(problem, clock, start)
+    since = perf_counter()
+    mass = mass_optimum(problem)
+    clock.charge("continuous time", since)
+    solution = _solve(problem, clock, start, mass)
     if solution.trajectory is None:
         return _with_tested_cures(solution, clock)
     since = perf_counter()
-    certificate, structure = findings(problem, solution.trajectory, solution.metrics)
+    certificate, structure = findings(problem, solution.trajectory, solution.metrics, mass)
     if solution.certificate["lower_bound"] is None and (least := floor(problem)) is not None:
         assert solution.duration is not None
         gap = 1 - least / solution.duration
@@ -71,7 +74,7 @@ def _works(problem: Problem, clock: Clock) -> bool:
     return answer.trajectory is not None and conclude(setting, route(problem), answer, clock, local=True).status.solved
 
 
-def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution:
+def _solve(problem: Problem, clock: Clock, start: Trajectory | None, mass: MassOptimum | None) -> Solution:
     """The checked answer, or the verdict."""
     chosen = route(problem)
     setting = Setting.of(problem)
@@ -94,7 +97,8 @@ def _solve(problem: Problem, clock: Clock, start: Trajectory | None) -> Solution
     elif _is_affine(problem):
         solution, attempt = _convex(setting, lean, chosen, clock)
     else:
-        solution, attempt = _by_descent(setting, lean, chosen, clock, start)
+        near = mass.on(lean) if start is None and mass is not None else start
+        solution, attempt = _by_descent(setting, lean, chosen, clock, near)
     ended = attempt.trajectory is None and attempt.outcome.claim in (Claim.INFEASIBLE, Claim.LIMIT)
     if solution.status.solved or lean is setting or ended:
         return solution

@@ -4,13 +4,14 @@ Servomotor energy without a jerk limit (``optimum``, ``conditions``), and mechan
 jerk limit (``least_peak_power`` and its neighbours).
 """
 
-from trajopt.velocity_domain.axis import Axis
+from trajopt.velocity_domain.axis import Axis, Ramp, over_time
 from trajopt.velocity_domain.conditions import Conditions, conditions
 from trajopt.velocity_domain.limits import Limits
 from trajopt.velocity_domain.motor import Servomotor
 from trajopt.velocity_domain.power import (
     PowerOptimum,
     least_energy,
+    least_peak,
     least_peak_power,
     minimum_time,
     power_within,
@@ -25,15 +26,18 @@ __all__ = [
     "Conditions",
     "Limits",
     "PowerOptimum",
+    "Ramp",
     "ServoOptimum",
     "Servomotor",
     "SquareOptimum",
     "State",
     "conditions",
     "least_energy",
+    "least_peak",
     "least_peak_power",
     "least_square_power",
     "minimum_time",
     "optimum",
+    "over_time",
     "power_within",
 ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from math import inf, isfinite, sqrt
 from typing import Any, Final
 
@@ -18,6 +18,7 @@ import numpy as np
 from trajopt.velocity_domain.motor import Floats
 
 _NODES: Final = 48
+_STEPS: Final = 64  # of a piece of a ramp over time
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,17 @@ class Axis:
         """(time, ∫(peak - v) dt) of the shortest way up to a peak speed and down again within a power limit."""
         if peak == 0:
             return 0.0, 0.0
+        first, last = self.shortest(peak, power)
+        (time, lag), (more, further) = first.extent, last.extent
+        return time + more, lag + further
+
+    def shortest(self, peak: float, power: float = inf) -> tuple[Ramp, Ramp]:
+        """That way up, and that way down."""
         up, down = self.ramps
         first = self._ramp(peak, power, up)
-        last = first if down == up else self._ramp(peak, power, down)
-        return first[0] + last[0], first[1] + last[1]
+        return first, first if down == up else self._ramp(peak, power, down)
 
-    def _ramp(self, peak: float, power: float, acceleration: float) -> tuple[float, float]:
+    def _ramp(self, peak: float, power: float, acceleration: float) -> Ramp:
         steep, cap = self.jerk, (power / self.mass) ** 2 / 2
         tangent = (2 * cap / steep) ** (1 / 3) if isfinite(cap) and isfinite(steep) else 0.0
 
@@ -69,7 +75,7 @@ class Axis:
             sides = np.minimum(v, below) * steep if isfinite(steep) else inf
             return np.minimum(np.minimum(capped, sides), acceleration**2 / 2) + 0 * v
 
-        return over_speed(height, self._edges(peak, cap, tangent, acceleration), peak)
+        return Ramp(height, self._edges(peak, cap, tangent, acceleration), peak)
 
     def _edges(self, peak: float, cap: float, tangent: float, acceleration: float) -> list[float]:
         """Every speed at which one bound of y may take over from another."""
@@ -83,11 +89,42 @@ class Axis:
         return [0.0, *sorted(v for v in found if 0 < v < peak), peak]
 
 
-def over_speed(height: Callable[[Floats, Floats], Floats], edges: list[float], peak: float) -> tuple[float, float]:
-    """(time, ∫(peak - v) dt) of a ramp with y = ``height``(v, peak - v), smooth between ``edges``."""
-    v, below, weight = between(*pieces(edges), peak)
-    pace = weight / np.sqrt(2 * height(v, below))
-    return float(pace.sum()), float(np.sum(pace * below))
+@dataclass(frozen=True)
+class Ramp:
+    """From rest to a peak speed, or back: y = ``height``(v, peak - v) over the speed v, smooth between ``edges``."""
+
+    height: Callable[[Floats, Floats], Floats]
+    edges: list[float]
+    peak: float
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """(time, ∫(peak - v) dt)."""
+        v, below, weight = between(*pieces(self.edges), self.peak)
+        pace = weight / np.sqrt(2 * self.height(v, below))
+        return float(pace.sum()), float(np.sum(pace * below))
+
+    def over_time(self) -> tuple[Floats, Floats, Floats]:
+        """(n,) times since rest, speeds and accelerations, so closely that what is between them is nearly straight."""
+        low, high = pieces(self.edges)
+        middle = (np.arange(_STEPS) + 0.5) / _STEPS
+        share = middle**2 * (3 - 2 * middle)
+        v, below = low + (high - low) * share, (self.peak - high) + (high - low) * (1 - share)
+        a = np.sqrt(2 * self.height(v, below)).ravel()
+        pace = ((high - low) * 6 * middle * (1 - middle) / _STEPS).ravel() / a
+        return np.cumsum(pace) - pace / 2, v.ravel(), a
+
+
+def over_time(ramps: tuple[Ramp, Ramp], duration: float, times: Floats) -> tuple[Floats, Floats]:
+    """(n,) speeds and accelerations, at ``times`` within the duration, of the move up the first ramp and, after a stay
+    at the peak speed, down the second one; interpolated."""
+    (up, v, a), (down, w, b) = (ramp.over_time() for ramp in ramps)
+    first = ramps[0].extent[0]
+    last = max(duration - ramps[1].extent[0], first)
+    time = np.concatenate([[0.0], up, [first, last], duration - down[::-1], [duration]])
+    peak = [ramps[0].peak] * 2
+    speed = np.interp(times, time, np.concatenate([[0.0], v, peak, w[::-1], [0.0]]))
+    return speed, np.interp(times, time, np.concatenate([a[:1], a, [0.0, 0.0], -b[::-1], -b[:1]]))
 
 
 def pieces(edges: list[float]) -> tuple[Floats, Floats]:

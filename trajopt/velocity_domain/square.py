@@ -8,14 +8,14 @@ principle: over it the derivative of the integrand by y has integral zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import acos, asinh, cos, exp, inf, isfinite, log, sinh, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
 
-from trajopt.velocity_domain.axis import Axis, between, over_speed, pieces
+from trajopt.velocity_domain.axis import Axis, Ramp, between, pieces
 from trajopt.velocity_domain.motor import Floats
 from trajopt.velocity_domain.power import least_peak, rising_root
 from trajopt.velocity_domain.roots import common_root
@@ -23,11 +23,12 @@ from trajopt.velocity_domain.roots import common_root
 
 @dataclass(frozen=True)
 class SquareOptimum:
-    """The least ∫P² dt, W² s, with the peak speed (m/s) and the energy (J) of the move that has it."""
+    """The least ∫P² dt, W² s, with the peak speed (m/s), the energy (J) and the ramps of the move that has it."""
 
     value: float
     peak: float
     energy: float
+    ramps: tuple[Ramp, Ramp] = field(repr=False, compare=False)
 
 
 def least_square_power(axis: Axis) -> SquareOptimum:
@@ -38,8 +39,8 @@ def least_square_power(axis: Axis) -> SquareOptimum:
         return sum(ramp.extent[0] for ramp in _priced(axis, peak)) - axis.duration
 
     ramps = _at_once(axis, low) or _priced(axis, rising_root(surplus, low * (1 + 1e-9), axis.velocity))
-    peak = ramps[0].peak
-    return SquareOptimum(sum(ramp.cost() for ramp in ramps), peak, axis.mass * peak**2)
+    peak, (up, down) = ramps[0].peak, ramps
+    return SquareOptimum(up.cost() + down.cost(), peak, axis.mass * peak**2, (up.shape, down.shape))
 
 
 def _at_once(axis: Axis, low: float) -> list[_Ramp]:
@@ -106,17 +107,21 @@ class _Ramp:
     peak: float
     price: float
 
-    @cached_property
+    @property
     def extent(self) -> tuple[float, float]:
         """(time, ∫(peak - v) dt)."""
+        return self.shape.extent
+
+    @cached_property
+    def shape(self) -> Ramp:
+        """y over speed."""
         turn, join = self._fall
-        return over_speed(lambda v, below: self._height(v, below, turn, join), self._edges(turn, join), self.peak)
+        return Ramp(lambda v, below: self._height(v, below, turn, join), self._edges(turn, join), self.peak)
 
     def cost(self) -> float:
         """∫P² dt, W² s."""
-        turn, join = self._fall
-        v, below, weight = between(*pieces(self._edges(turn, join)), self.peak)
-        return float(np.sum(weight * (self.mass**2 * v**2 * np.sqrt(2 * self._height(v, below, turn, join)))))
+        v, below, weight = between(*pieces(self.shape.edges), self.peak)
+        return float(np.sum(weight * (self.mass**2 * v**2 * np.sqrt(2 * self.shape.height(v, below)))))
 
     @property
     def _share(self) -> float:
