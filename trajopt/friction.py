@@ -44,10 +44,8 @@ class Shared(Quantities):
 
     def _coulomb(self, velocity: Signal) -> Signal:
         load, way = self.problem.load, self.problem.one_way
-        kept = getattr(self.model, "friction_share", None)
-        if kept is None:
-            kept = self.model.friction_share = self._share(way * velocity.nodes, bool(velocity.pieces))
-        friction = self.model.times(way * load.coulomb, kept)
+        share = self._share(way * velocity.nodes, bool(velocity.pieces))
+        friction = self.model.times(way * load.coulomb, share)
         return Signal(None, (friction,)) if velocity.pieces else Signal(friction, ())
 
     def _share(self, speed: Any, whole: bool) -> Any:

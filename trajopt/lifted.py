@@ -55,16 +55,12 @@ class Lifted(Quantities):
     touch: tuple[Touch, ...] = ()
 
     def _power(self) -> Signal:
-        kept = getattr(self.model, "lifted_power", None)
-        if kept is None:
-            known = self._nodes() if self.problem.order == 3 else self._ends()
-            kept = self.model.lifted_power = known
-        return kept
+        return self._nodes() if self.problem.order == 3 else self._ends()
 
     def _electrical_power(self) -> Signal:
         model, load = self.model, self.problem.load
         heats = [motor.heat(model, load, u, self.sizes.current) for (u,) in self.ends("current")]
-        mechanical = self._power()
+        mechanical = self.signal("power")
         if mechanical.degree == 0:  # the mean of both ends alone is known
             return Signal(None, (sum(heats[1:], heats[0]) * (1 / len(heats)) + mechanical.pieces[0],))
         powers = [heat + power for heat, power in zip(heats, mechanical.stations, strict=True)]

@@ -8,6 +8,7 @@ force = inertia·a + viscous·v + coulomb·sign(v) (Clemen & Rupp eq. 13, 14); p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -54,7 +55,16 @@ class Quantities:
     steps: Any  # (N,) s
 
     def signal(self, name: str) -> Signal:
-        """A quantity by name, SI; position is the displacement from the start."""
+        """A quantity by name, SI, made once; position is the displacement from the start."""
+        if name not in self._known:
+            self._known[name] = self._made(name)
+        return self._known[name]
+
+    @cached_property
+    def _known(self) -> dict[str, Signal]:
+        return {}
+
+    def _made(self, name: str) -> Signal:
         if name in DERIVATIVES:
             return self.scheme.signal(self.model, self.chain, DERIVATIVES.index(name), self.steps)
         made = {
@@ -167,9 +177,6 @@ class Quantities:
 
     def _along(self) -> Signal:
         """Force of a load over position: at the Lobatto points of the intervals; polynomials where metrics ask."""
-        if (kept := getattr(self.model, "kept_force", None)) is not None:
-            found: Signal = kept
-            return found
         position, velocity, acceleration = (self.signal(name) for name in DERIVATIVES[:3])
         if isinstance(self.model, BetweenReversals):
             at = [[x.within(self.model, s) for x in (position, velocity, acceleration)] for s in _FITTED]
@@ -179,10 +186,7 @@ class Quantities:
         jumps = acceleration.nodes is None
         inner = Signal(acceleration.nodes, (), LOBATTO if jumps else LOBATTO[1:-1])
         where = zip(*(x.where(self.model, inner) for x in (position, velocity, acceleration)), strict=True)
-        force = signals.sampled([self._smooth(q, v, a) + self._rubbing(v) for q, v, a in where], inner)
-        if not isinstance(self.model, OnFloats):  # its variables join the model once
-            self.model.kept_force = force
-        return force
+        return signals.sampled([self._smooth(q, v, a) + self._rubbing(v) for q, v, a in where], inner)
 
     def _smooth(self, displacement: Any, velocity: Any, acceleration: Any) -> Any:
         """The force at vectors of samples, but for Coulomb friction."""
@@ -223,7 +227,7 @@ class Quantities:
         return Signal(coulomb * nodes, tuple(coulomb * piece for piece in pieces) if velocity.pieces else ())
 
     def _power(self) -> Signal:
-        return signals.product(self.model, self._force(), self.signal("velocity"))
+        return signals.product(self.model, self.signal("force"), self.signal("velocity"))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import factorial
 from typing import Any
 
@@ -40,6 +41,9 @@ class Trajectory:
         for values in self.chain:
             values.flags.writeable = False
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "transcript"}  # which others can make
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self.__post_init__()
@@ -56,7 +60,7 @@ class Trajectory:
         time[-1] = self.duration
         return time
 
-    @property
+    @cached_property
     def transcript(self) -> Transcript:
         """The trajectory as the builder sees it."""
         model = self.arithmetic
