@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from trajopt.axes.motion import loads
 from trajopt.axes.problem import AxesProblem
 from trajopt.mesh import Floats, Mesh, mesh_for
 from trajopt.problem import FREE
-from trajopt.quantities import Driven
+from trajopt.quantities import Driven, Quantities
 from trajopt.signals import Signal
 from trajopt.transcribe import Setting, Transcript, hold, lay
 
@@ -103,7 +103,8 @@ def _torques(arm: Any, model: Any, axes: Sequence[Transcript]) -> tuple[tuple[An
 
 def _loaded(axis: Transcript, ends: tuple[Any, ...]) -> Transcript:
     torque = Signal(ends[0], ()) if len(ends) == 1 else Signal(None, ends)
-    return replace(axis, quantities=Driven(**vars(axis.quantities), torque=torque))
+    known = {field.name: getattr(axis.quantities, field.name) for field in fields(Quantities)}
+    return replace(axis, quantities=Driven(**known, torque=torque))
 
 
 def _reach(setting: AxesSetting, model: Any, axes: Sequence[Transcript]) -> Any:
