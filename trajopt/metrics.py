@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import comb
 from typing import Final
 
@@ -11,7 +12,7 @@ from numpy.polynomial import polynomial
 from trajopt import motor, vibration
 from trajopt.mesh import Floats
 from trajopt.problem import DERIVATIVES
-from trajopt.signals import OnFloats, Signal, gauss, product
+from trajopt.signals import OnFloats, Signal, gauss
 from trajopt.trajectory import Trajectory
 
 _PARTS: Final = 400  # on these, 18 points miss no change of sign that matters
@@ -110,8 +111,9 @@ def rms(trajectory: Trajectory, signal: Signal) -> float:
     """sqrt((1/T)∫x²dt)."""
     if not signal.pieces:
         return float(np.sqrt(np.trapezoid(np.square(signal.nodes), trajectory.time) / trajectory.duration))
-    square = product(trajectory.transcript.model, signal, signal)
-    return float(np.sqrt(np.sum(_integrals(trajectory, square)) / trajectory.duration))
+    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    squares = np.sum(pieces * (_products(signal.degree) @ pieces), axis=0)
+    return float(np.sqrt(np.diff(trajectory.time) @ squares / trajectory.duration))
 
 
 def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = False) -> float:
@@ -146,12 +148,22 @@ def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
     return integrals
 
 
+@cache
+def _products(n: int) -> Floats:
+    """(n+1, n+1) the integrals over [0, 1] of products of two Bernstein polynomials of degree n."""
+    return np.array([[comb(n, i) * comb(n, j) / (comb(2 * n, i + j) * (2 * n + 1)) for i in range(n + 1)]
+                     for j in range(n + 1)])  # fmt: skip
+
+
+@cache
+def _powers(n: int) -> Floats:
+    return np.array([[(-1.0) ** (j - i) * comb(n, j) * comb(j, i) if i <= j else 0.0 for i in range(n + 1)]
+                     for j in range(n + 1)])  # fmt: skip
+
+
 def _power_form(bernstein: Floats) -> Floats:
     """(n+1, m) power coefficients, lowest first, of m polynomials from their Bernstein coefficients on [0, 1]."""
-    n = len(bernstein) - 1
-    basis = [[(-1.0) ** (j - i) * comb(n, j) * comb(j, i) if i <= j else 0.0 for i in range(n + 1)]
-             for j in range(n + 1)]  # fmt: skip
-    power: Floats = np.array(basis) @ bernstein
+    power: Floats = _powers(len(bernstein) - 1) @ bernstein
     return power
 
 

@@ -83,17 +83,23 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
 
 
 def absolute_integral(rows: Array, length: Array) -> float:
-    """The integral of |p| over all pieces, split where p changes its sign."""
+    """The integral of |p| over all pieces, split where p changes its sign until its chord does for it."""
     total, slack = 0.0, 1e-13 * np.abs(rows).max()
     enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
+    share = np.linspace(0.0, 1.0, rows.shape[1])
     for _ in range(60):
-        whole = np.all(rows >= -slack, axis=1) | np.all(rows <= slack, axis=1)
+        whole = (rows.min(axis=1) >= -slack) | (rows.max(axis=1) <= slack)
         total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
         rows, length = rows[~whole], length[~whole]
-        if len(rows) == 0 or np.sum(length * np.max(np.abs(rows), axis=1)) <= enough:
+        first, last = rows[:, 0], rows[:, -1]
+        apart = rows - np.outer(first, 1 - share) - np.outer(last, share)
+        if np.abs(apart).max(axis=1, initial=0.0) @ length <= enough:  # the integrals differ by no more
             break
         rows, length = _halves(rows), np.tile(length / 2, 2)
-    return total
+    crossing = first * last < 0
+    straight = np.abs(first + last) / 2
+    straight[crossing] = ((first**2 + last**2)[crossing] / np.abs(last - first)[crossing]) / 2
+    return total + float(straight @ length)
 
 
 def both_signs(function: Callable[[Integers, Array], Array], length: Array) -> tuple[float, float]:
