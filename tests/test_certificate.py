@@ -61,7 +61,7 @@ def known_program(seed: int, quadratic: bool = True, bounded: bool = False) -> K
     P = root @ root.T if quadratic else np.zeros((n, n))
     s, dual = np.concatenate(slack), np.concatenate(z)
     program = ConeProgram(
-        sparse.csc_array(P), -P @ x - A.T @ dual, sparse.csc_array(A), A @ x + s, zero, nonnegative, cones
+        sparse.csc_array(P), -P @ x - A.T @ dual, sparse.csr_array(A), A @ x + s, zero, nonnegative, cones
     )
     return Known(program, x, dual)
 
@@ -109,7 +109,7 @@ def test_a_broken_vector_bounds_nothing() -> None:
 
 def test_dual_feasibility_is_imposed_not_assumed() -> None:
     """min x, x >= 1 (as -x + s = -1): z = 1 proves 1; z = 5 or z = -3, outside or off, prove no more."""
-    program = ConeProgram(sparse.csc_array((1, 1)), np.array([1.0]), sparse.csc_array([[-1.0]]), np.array([-1.0]), 0, 1)
+    program = ConeProgram(sparse.csc_array((1, 1)), np.array([1.0]), sparse.csr_array([[-1.0]]), np.array([-1.0]), 0, 1)
     assert lower_bound(program, np.array([1.0]), np.array([1.0])) == 1.0
     for z in (5.0, -3.0, 0.0, 1.5):
         assert lower_bound(program, np.array([1.0]), np.array([z])) <= 1.0
@@ -120,7 +120,7 @@ def test_dual_feasibility_is_imposed_not_assumed() -> None:
 
 def contradiction(gap: float) -> tuple[ConeProgram, np.ndarray]:
     """x = y, y >= 1 and x <= 1 - gap, with the ray that shows it."""
-    A = sparse.csc_array([[1.0, -1.0], [0.0, -1.0], [1.0, 0.0]])
+    A = sparse.csr_array([[1.0, -1.0], [0.0, -1.0], [1.0, 0.0]])
     program = ConeProgram(sparse.csc_array((2, 2)), np.zeros(2), A, np.array([0.0, -1.0, 1.0 - gap]), 1, 2)
     return program, np.array([-1.0, 1.0, 1.0])
 
@@ -137,7 +137,7 @@ def test_an_infeasible_program_is_proved_so_by_its_ray(gap: float) -> None:
 def test_stationarity_is_restored_where_the_objective_is_curved() -> None:
     """The least of |x|²/2 with x1 + ... + x8 = 1: one multiplier cannot make up for eight values that are off."""
     n = 8
-    program = ConeProgram(sparse.csc_array(np.eye(n)), np.zeros(n), sparse.csc_array(np.ones((1, n))), np.ones(1), 1, 0)
+    program = ConeProgram(sparse.csc_array(np.eye(n)), np.zeros(n), sparse.csr_array(np.ones((1, n))), np.ones(1), 1, 0)
     x = 1 / n + 1e-6 * np.random.default_rng(3).normal(size=n)
     assert lower_bound(program, x, np.array([-1 / n])) == pytest.approx(1 / (2 * n), rel=1e-9)
 
@@ -150,7 +150,7 @@ def test_a_feasible_program_is_not_proved_infeasible_by_the_same_ray() -> None:
 
 def test_an_infeasible_cone_is_proved_so() -> None:
     """|(x, 1)| <= t with t <= 0.5."""
-    A = sparse.csc_array([[0.0, 1.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 0.0]])
+    A = sparse.csr_array([[0.0, 1.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 0.0]])
     program = ConeProgram(sparse.csc_array((2, 2)), np.zeros(2), A, np.array([0.5, 0.0, 0.0, 1.0]), 0, 1, (3,))
     assert is_infeasible(program, np.array([1.0, 1.0, 0.0, -1.0]))
     wide = ConeProgram(sparse.csc_array((2, 2)), np.zeros(2), A, np.array([1.5, 0.0, 0.0, 1.0]), 0, 1, (3,))
@@ -174,14 +174,14 @@ def test_rounding_in_repeated_equalities_is_no_contradiction(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows, x = rng.normal(size=(2, 4)), rng.normal(size=4)
     A = np.vstack([rows, rows.sum(axis=0)])
-    program = ConeProgram(sparse.csc_array((4, 4)), np.zeros(4), sparse.csc_array(A), A @ x, 3, 0)
+    program = ConeProgram(sparse.csc_array((4, 4)), np.zeros(4), sparse.csr_array(A), A @ x, 3, 0)
     for z in (np.array([1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0])):
         assert not is_infeasible(program, z)
 
 
 def test_proofs_hold_for_points_within_reach() -> None:
     """A program whose only point lies far beyond REACH may be refused; one just within may not."""
-    A = sparse.csc_array([[1.0]])
+    A = sparse.csr_array([[1.0]])
     near = ConeProgram(sparse.csc_array((1, 1)), np.zeros(1), A, np.array([0.99 * REACH]), 1, 0)
     for z in (-1.0, 1.0):
         assert not is_infeasible(near, np.array([z]))

@@ -32,7 +32,7 @@ class ConeProgram:
 
     P: sparse.csc_array
     q: Floats
-    A: sparse.csc_array
+    A: sparse.csr_array
     b: Floats
     zero: int
     nonnegative: int
@@ -88,7 +88,7 @@ def _separates(program: ConeProgram, z: Floats, reach: Floats) -> bool:
 def _reach(program: ConeProgram, otherwise: float) -> Floats:
     """(n,) what no variable exceeds in size: by its own bounds where rows with one entry state them."""
     below, above = np.full(len(program.q), otherwise), np.full(len(program.q), otherwise)
-    rows = sparse.csr_array(program.A[program.zero : program.zero + program.nonnegative])
+    rows = program.A[program.zero : program.zero + program.nonnegative]
     single = np.flatnonzero(np.diff(rows.indptr) == 1)
     columns, entries = rows.indices[rows.indptr[single]], rows.data[rows.indptr[single]]
     bounds = program.b[program.zero : program.zero + program.nonnegative][single] / entries

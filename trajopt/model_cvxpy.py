@@ -165,7 +165,7 @@ class ConvexModel:
         equal, below, inside = (stacked(rows.parts) for rows in self._rows.values())
         rows = stacked([equal, below, inside * -1.0])
         P, q, self._constant = self._objective.quadratic(self._count)
-        A = sparse.csc_array(rows.matrix(self._count))
+        A = rows.matrix(self._count)
         for kind in self._rows.values():
             kind.parts = []  # the memory of large meshes
         return certificate.ConeProgram(P, q, A, -rows.constant, len(equal), len(below), tuple(self._sizes))
@@ -255,13 +255,12 @@ def _data(name: str, program: certificate.ConeProgram) -> dict[str, Any]:
     """The program under the names that CVXPY's interfaces read."""
     P, A, b, zero = program.P, program.A, program.b, program.zero
     if name in SOLVER_MAP_QP:
-        rows = sparse.csr_array(A)
-        equal, below = sparse.csc_array(rows[:zero]), sparse.csc_array(rows[zero:])
+        equal, below = (sparse.csc_array(rows) for rows in (A[:zero], A[zero:]))
         return {"P": P, "q": program.q, "A": equal, "b": b[:zero], "F": below, "G": b[zero:]}
     dims = SimpleNamespace(
         zero=zero, nonneg=program.nonnegative, soc=list(program.cones), exp=0, psd=[], p3d=[], pnd=[]
     )
-    return {"P": P, "c": program.q, "A": A, "b": b, "dims": dims}
+    return {"P": P, "c": program.q, "A": sparse.csc_array(A), "b": b, "dims": dims}
 
 
 def _read(interface: Any, raw: Any) -> tuple[str, int, Floats, Floats]:
