@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -95,7 +96,13 @@ class Measured:
     norm: norms.Norm | None  # None: the term is the duration itself
     weight: float
     size: float  # of the samples, SI
-    unit: float  # the norm of samples that are all one
+    usual: Any  # the weights and the duration where parts of it are free: floats
+    typical: float
+
+    @cached_property
+    def unit(self) -> float:
+        """The norm of samples that are all one."""
+        return 1.0 if self.norm is None else self.norm.measure(np.ones(len(self.usual)), self.usual, self.typical)
 
     @property
     def scale(self) -> float:
@@ -120,11 +127,13 @@ class Measured:
     def of(cls, transcript: Transcript, term: Term) -> Measured:
         duration, sizes = transcript.duration, transcript.sizes
         if term.minimize == "time":
-            return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, 1.0)
+            return cls(None, np.ones(1), duration, None, term.weight, sizes.duration, np.ones(1), 1.0)
         energy = term.minimize in WITHOUT_NORM
         quantity = POWERS.get(term.minimize, term.minimize)
         signal = transcript.quantities.signal(quantity)
-        weights, usual = (transcript.scheme.weights(signal, x) for x in (transcript.shares, transcript.mesh.steps))
+        weights = usual = transcript.scheme.weights(signal, transcript.mesh.steps)
+        if transcript.phased:
+            weights = transcript.scheme.weights(signal, transcript.shares)
         typical = sizes.duration
         if transcript.scheme.terms == 1:  # Euler: plain sums, as in the paper; but an energy stays an integral
             if energy:
@@ -135,5 +144,4 @@ class Measured:
         if quantity == "position" and transcript.problem.move.start_position is None:
             samples = samples - transcript.chain[0][0]  # positions are absolute then; the norm is of the displacement
         norm = term.norm or integral(term.minimize, transcript.problem.load)
-        unit = norm.measure(np.ones(len(usual)), usual, typical)
-        return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), unit)
+        return cls(samples, weights, duration, norm, term.weight, sizes.of(quantity), usual, typical)

@@ -30,10 +30,13 @@ def rebuild(
             conditions.append((node, i, value))
     lower, upper = node_limits(problem, problem.order, mesh, duration)
     top = np.clip(top, lower, upper)
-    for _ in range(2):  # the second pass removes the rounding of the first
+    scale = np.array([sizes.derivative[i] for _, i, _ in conditions])
+    effects = [scheme.influence(i, problem.order, node, steps) for node, i, _ in conditions]
+    for _ in range(2 if conditions else 0):  # the second pass removes the rounding of the first
         chain = scheme.rollout(start, top, steps)
-        if conditions:
-            top = top + _correction(chain, conditions, scheme, sizes, steps, np.minimum(upper - top, top - lower))
+        miss = np.array([value - chain[i][node] for node, i, value in conditions])
+        room = np.minimum(upper - top, top - lower) / sizes.derivative[problem.order]
+        top = top + _correction(np.array(effects) / scale[:, None], miss / scale, room)
     chain = scheme.rollout(start, top, steps)
     for node, i, value in conditions:
         if node == mesh.intervals and abs(chain[i][node] - value) <= 1e-11 * sizes.derivative[i]:
@@ -41,20 +44,8 @@ def rebuild(
     return Trajectory(problem, mesh, scheme, sizes, duration, problem.move.start_position or 0.0, tuple(chain))
 
 
-def _correction(
-    chain: list[Floats],
-    conditions: list[tuple[int, int, float]],
-    scheme: Scheme,
-    sizes: Sizes,
-    steps: Floats,
-    room: Floats,
-) -> Floats:
-    """(N,) the smallest change of the top derivative, weighted by its room, that meets the conditions."""
-    order = len(chain) - 1
-    scale = sizes.derivative[order]
-    weight = np.square(np.clip(room / scale, 1e-4, 1.0))
-    rows = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
-    miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
-    weighted = rows * weight
-    multiplier = np.linalg.lstsq(weighted @ rows.T, miss, rcond=None)[0]
+def _correction(effects: Floats, miss: Floats, room: Floats) -> Floats:
+    """(N,) the smallest change of the top derivative, weighted by its room, that makes good what is missing."""
+    weighted = effects * np.square(np.clip(room, 1e-4, 1.0))
+    multiplier = np.linalg.lstsq(weighted @ effects.T, miss, rcond=None)[0]
     return np.asarray(weighted.T @ multiplier)
