@@ -58,7 +58,7 @@ def mass_optimum(problem: Problem) -> MassOptimum | None:
         return None
     try:
         return _mass_optimum(problem)
-    except (ValueError, RuntimeError):  # time too short for it, or not met to a billionth: nothing is claimed
+    except (ValueError, RuntimeError, ArithmeticError):  # too little time, not met to a billionth, absurd numbers
         return None
 
 
@@ -77,7 +77,7 @@ def findings(
     if _motor_alone(problem):
         try:
             optimum = _servo(problem)
-        except (ValueError, RuntimeError):  # as above
+        except (ValueError, RuntimeError):  # too little time, or not met to a billionth
             return {}, _on_mesh(trajectory)
         if certificate := _certificate(problem, optimum.energy, metrics):
             return certificate, _structure(optimum)

@@ -49,7 +49,7 @@ class Search:
         self.answers: list[Answer] = []
         self.convex = is_convex(problem)
         self._hands, self._progress = hands, progress
-        self._fine = _BLENDS if request.error is None else float(np.clip(2.5 / request.error, _BLENDS, 8192))
+        self._fine = _BLENDS if request.error is None else float(np.clip(2.5 / request.error, _BLENDS, 8192))  # blends
         self._blended: dict[tuple[int, int], Floats] = {}
         self._asked: list[Floats] = []
         self._started = perf_counter()
