@@ -36,7 +36,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     # A fifth slower, and reliable up to N = 100000, where more than this cannot be asked for; there shorter steps do
     # with fewer iterations.
     "piqp-firm": dict.fromkeys(_PIQP, 1e-9) | {
-        "max_iter": 100, "reg_lower_limit": 1e-12, "preconditioner_iter": 3, "tau": 0.95, "delta_init": 1e-9,
+        "max_iter": 100, "reg_lower_limit": 1e-12, "preconditioner_iter": 3, "tau": 0.97, "delta_init": 1e-7,
     },
     # Measured: little regularisation is accurate, and fails from N = 20000 on; more solves those.
     "clarabel": _CLARABEL | {"static_regularization_constant": 1e-10},
