@@ -305,14 +305,23 @@ def _uncertified(data: dict[str, Any]) -> None:
     data["error"] = None
 
 
-def _more_blends(data: dict[str, Any]) -> None:
+def _fewer_blends(data: dict[str, Any]) -> None:
     data["blends"] = [1] * len(data["blends"])
+
+
+def _one_number(data: dict[str, Any]) -> None:
+    data["blends"] = 64
+
+
+def _missing_blends(data: dict[str, Any]) -> None:
+    del data["blends"][0]
 
 
 @pytest.mark.parametrize(
     ("edit", "word"),
     [(_tighter, "error"), (_moved, "values energy"), (_raised, "bounds"), (_outside, "structure"),
-     (_uncertified, "error"), (_more_blends, "error")],
+     (_uncertified, "error"), (_fewer_blends, "error"),
+     (_one_number, "structure"), (_missing_blends, "structure")],
 )  # fmt: skip
 def test_a_front_that_claims_more_is_caught(written: Path, tmp_path: Path, edit: Any, word: str) -> None:
     shutil.copytree(written, tmp_path / "front")

@@ -32,7 +32,8 @@ _PROVEN: Final = ("energy", "power linf")  # of the others, the best peak speed 
 
 @dataclass(frozen=True)
 class MassOptimum:
-    """What is least for a mass, in the unit of the objective's signal, and the ramps of the move that takes it."""
+    """The least energy (J), or norm of power (W), of a mass, without the weight of the objective, and the ramps of the
+    move that has it."""
 
     value: float
     ramps: tuple[vd.Ramp, vd.Ramp]

@@ -25,17 +25,17 @@ from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size
 
 cp: Any = cvxpy  # its atoms are exported in a way that type checkers do not see
 _CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
-_PIQP: Final = ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel")
+_PIQP_TOLERANCES: Final = ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel")
 _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     # Measured: four times as fast as Clarabel, as exact, in 10 to 25 iterations; or not at all. Longer steps with less
     # regularisation save an eighth of them; even longer ones fail at times.
-    "piqp": dict.fromkeys(_PIQP, 1e-11) | {
+    "piqp": dict.fromkeys(_PIQP_TOLERANCES, 1e-11) | {
         "max_iter": 50, "kkt_solver": "sparse_ldlt_ineq_cond", "preconditioner_iter": 3, "tau": 0.997,
         "delta_init": 1e-6,
     },
     # A fifth slower, and reliable up to N = 100000, where more than this cannot be asked for; there shorter steps do
     # with fewer iterations.
-    "piqp-firm": dict.fromkeys(_PIQP, 1e-9) | {
+    "piqp-firm": dict.fromkeys(_PIQP_TOLERANCES, 1e-9) | {
         "max_iter": 100, "reg_lower_limit": 1e-12, "preconditioner_iter": 3, "tau": 0.97, "delta_init": 1e-7,
     },
     # Measured: little regularisation is accurate, and fails from N = 20000 on; more solves those.

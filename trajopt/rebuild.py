@@ -30,13 +30,12 @@ def rebuild(
             conditions.append((node, i, value))
     lower, upper = node_limits(problem, problem.order, mesh, duration)
     top = np.clip(top, lower, upper)
-    scale = np.array([sizes.derivative[i] for _, i, _ in conditions])
-    effects = [scheme.influence(i, problem.order, node, steps) for node, i, _ in conditions]
+    order = problem.order
+    effects = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
     for _ in range(2 if conditions else 0):  # the second pass removes the rounding of the first
         chain = scheme.rollout(start, top, steps)
-        miss = np.array([value - chain[i][node] for node, i, value in conditions])
-        room = np.minimum(upper - top, top - lower) / sizes.derivative[problem.order]
-        top = top + _correction(np.array(effects) / scale[:, None], miss / scale, room)
+        miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
+        top = top + _correction(effects, miss, np.minimum(upper - top, top - lower) / sizes.derivative[order])
     chain = scheme.rollout(start, top, steps)
     for node, i, value in conditions:
         if node == mesh.intervals and abs(chain[i][node] - value) <= 1e-11 * sizes.derivative[i]:
@@ -45,7 +44,8 @@ def rebuild(
 
 
 def _correction(effects: Floats, miss: Floats, room: Floats) -> Floats:
-    """(N,) the smallest change of the top derivative, weighted by its room, that makes good what is missing."""
+    """(N,) the smallest change of the top derivative, weighted by its (N,) ``room``, that makes good what is ``miss``
+    (m,) of the conditions; (m, N) ``effects`` on them. All but the change over sizes."""
     weighted = effects * np.square(np.clip(room, 1e-4, 1.0))
     multiplier = np.linalg.lstsq(weighted @ effects.T, miss, rcond=None)[0]
     return np.asarray(weighted.T @ multiplier)

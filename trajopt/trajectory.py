@@ -42,7 +42,7 @@ class Trajectory:
             values.flags.writeable = False
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "transcript"}  # which others can make
+        return {name: value for name, value in self.__dict__.items() if name != "transcript"}  # made anew
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

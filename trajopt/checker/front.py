@@ -30,6 +30,7 @@ _ERROR: Final = 1e-6  # of the ranges, between the stated error and ours
 _FAR: Final = 1e9
 _COUNTED: Final = 4.0  # ranges: moves that are worse than that in an objective do not count
 _MANY: Final = 60  # points of three objectives: with more, there are more corners than can be looked at
+_MOST_BLENDS: Final = 100_000  # of two neighbours: more would keep the check busy for minutes
 _NONCONVEX: Final = ("force", "power", "current", "voltage")
 
 
@@ -47,6 +48,7 @@ class _Front:
     low: Array
     size: Array
     kept: int  # of the points, those that no other dominates, which come first
+    blends: list[int]  # how many moves were blended of each two neighbours among them; none where that means nothing
 
     def depth(self, corners: Array) -> Array:
         """(u,) how far each of the normalised ``corners`` (u, m) reaches beyond what bounds every move."""
@@ -122,7 +124,10 @@ def _front(stated: Mapping[str, Any], cases: list[Case]) -> _Front:
         raise Malformed("a half-plane has negative weights, or numbers that are not finite")
     size = np.where(high - low > 1e-6 * np.abs(high), high - low, np.maximum(np.abs(high), 1e-300))
     kept = sum(entry["on_front"] is True for entry in stated["points"])
-    return _Front(terms, cases, values, weights, least, np.array(corners).reshape(-1, count), low, size, kept)
+    blends = list(stated["blends"])
+    if len(blends) not in (0, kept - 1) or not all(type(x) is int and 0 <= x <= _MOST_BLENDS for x in blends):
+        raise Malformed(f"blends must be whole numbers, one for each two neighbours: {shown(stated['blends'])}")
+    return _Front(terms, cases, values, weights, least, np.array(corners).reshape(-1, count), low, size, kept, blends)
 
 
 def _values(case: Case, terms: tuple[tuple[str, str | None], ...]) -> list[float]:
@@ -174,7 +179,7 @@ def _error_checks(front: _Front, stated: Mapping[str, Any], notes: list[str]) ->
         notes.append("the error of the front (none is stated)")
         claims = stated["status"] == "SOLVED" and asked is not None
         return [question("error", "SOLVED, but the error asked for is not certified" if claims else "")]
-    ours = _error(front, bool(stated["convex"]), [int(count) for count in stated["blends"]])
+    ours = _error(front, bool(stated["convex"]))
     if ours is None:
         notes.append("the error of the front: too many corners to look at")
         return []
@@ -184,7 +189,7 @@ def _error_checks(front: _Front, stated: Mapping[str, Any], notes: list[str]) ->
     return [*checks, question("error as asked", f"{error!r} is more than {asked!r}" if late else "")]
 
 
-def _error(front: _Front, convex: bool, blends: list[int]) -> float | None:
+def _error(front: _Front, convex: bool) -> float | None:
     """The most by which any move may be better than all that was achieved, in every objective, normalised."""
     points = (front.values - front.low) / front.size
     if convex:
@@ -194,7 +199,7 @@ def _error(front: _Front, convex: bool, blends: list[int]) -> float | None:
         below = np.min(points @ normals.T, axis=0) - _vertices(front) @ normals.T  # the most is the distance
         return float(np.max(below, initial=0.0))
     if points.shape[1] == 2:
-        moves = np.vstack([front.values, *_blended(front, blends)])
+        moves = np.vstack([front.values, *_blended(front)])
         return float(np.max(front.depth(_stairs((moves - front.low) / front.size)), initial=0.0))
     if len(points) > _MANY:
         return None
@@ -253,12 +258,11 @@ def _normals(points: Array) -> Array:
     return np.vstack(found)
 
 
-def _blended(front: _Front, counts: list[int]) -> list[Array]:
-    """The objectives of moves blended of neighbours, so many of each two; SI, and of those that keep the limits that
-    are not convex. Without counts there are none."""
+def _blended(front: _Front) -> list[Array]:
+    """The objectives of moves blended of neighbours, SI; of those that keep the limits that are not convex."""
     order = sorted(range(front.kept), key=lambda k: tuple(front.values[k]))
     found = []
-    for i, j, count in zip(order, order[1:], counts, strict=False):
+    for i, j, count in zip(order, order[1:], front.blends, strict=False):
         if front.cases[i].end_time != front.cases[j].end_time:
             continue  # moves of different durations cannot be blended
         first, second = front.cases[i], front.cases[j]

@@ -91,11 +91,11 @@ def absolute_integral(rows: Array, length: Array) -> float:
         whole = (rows.min(axis=1) >= -slack) | (rows.max(axis=1) <= slack)
         total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
         rows, length = rows[~whole], length[~whole]
-        first, last = rows[:, 0], rows[:, -1]
-        apart = rows - np.outer(first, 1 - share) - np.outer(last, share)
+        apart = rows - np.outer(rows[:, 0], 1 - share) - np.outer(rows[:, -1], share)
         if np.abs(apart).max(axis=1, initial=0.0) @ length <= enough:  # the integrals differ by no more
             break
         rows, length = _halves(rows), np.tile(length / 2, 2)
+    first, last = rows[:, 0], rows[:, -1]
     crossing = first * last < 0
     straight = np.abs(first + last) / 2
     straight[crossing] = ((first**2 + last**2)[crossing] / np.abs(last - first)[crossing]) / 2

@@ -49,7 +49,7 @@ class Search:
         self.answers: list[Answer] = []
         self.convex = is_convex(problem)
         self._hands, self._progress = hands, progress
-        self._fine = _BLENDS if request.error is None else float(np.clip(2.5 / request.error, _BLENDS, 8192))  # blends
+        self._per_range = _BLENDS if request.error is None else float(np.clip(2.5 / request.error, _BLENDS, 8192))
         self._blended: dict[tuple[int, int], Floats] = {}
         self._asked: list[Floats] = []
         self._started = perf_counter()
@@ -192,11 +192,11 @@ class Search:
     def _count(self, first: Point, second: Point) -> int:
         """How many moves to blend of two neighbours: the more, the farther they lie apart."""
         apart = np.abs(np.subtract(second.values, first.values)) / ranges(*self._ends)
-        return ceil(self._fine * float(np.max(apart)))
+        return ceil(self._per_range * float(np.max(apart)))
 
     def _counts(self) -> tuple[int, ...]:
         """Of each two neighbours; none where blends play no part."""
-        if self.convex or len(self.terms) > 2 or not self._fine:
+        if self.convex or len(self.terms) > 2 or not self._per_range:
             return ()
         return tuple(self._count(p, q) for p, q in pairwise(self._points()))
 

@@ -27,7 +27,7 @@ class TimeSearch(Search):
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.convex, self._fine = False, 0.0  # moves of different durations are not mixed
+        self.convex, self._per_range = False, 0.0  # moves of different durations are not mixed
 
     def run(self) -> Front:
         longest = self.problem.move.fixed_time

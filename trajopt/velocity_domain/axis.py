@@ -91,7 +91,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class Ramp:
-    """From rest to a peak speed, or back: y = ``height``(v, peak - v) over the speed v, smooth between ``edges``."""
+    """From rest to a peak speed (m/s), or back: y = ``height``(v, peak - v), m²/s⁴, over the speed v, smooth between
+    ``edges`` (m/s)."""
 
     height: Callable[[Floats, Floats], Floats]
     edges: list[float]
@@ -99,13 +100,13 @@ class Ramp:
 
     @cached_property
     def extent(self) -> tuple[float, float]:
-        """(time, ∫(peak - v) dt)."""
+        """(time, ∫(peak - v) dt), s and m."""
         v, below, weight = between(*pieces(self.edges), self.peak)
         pace = weight / np.sqrt(2 * self.height(v, below))
         return float(pace.sum()), float(np.sum(pace * below))
 
     def over_time(self) -> tuple[Floats, Floats, Floats]:
-        """(n,) times since rest, speeds and accelerations, so closely that what is between them is nearly straight."""
+        """(n,) times since rest (s), speeds (m/s) and accelerations (m/s²), so close that lines join them."""
         low, high = pieces(self.edges)
         middle = (np.arange(_STEPS) + 0.5) / _STEPS
         share = middle**2 * (3 - 2 * middle)
@@ -116,8 +117,8 @@ class Ramp:
 
 
 def over_time(ramps: tuple[Ramp, Ramp], duration: float, times: Floats) -> tuple[Floats, Floats]:
-    """(n,) speeds and accelerations, at ``times`` within the duration, of the move up the first ramp and, after a stay
-    at the peak speed, down the second one; interpolated."""
+    """(n,) speeds (m/s) and accelerations (m/s²), at ``times`` (n,) within the duration (s), of the move up the first
+    ramp and, after a stay at the peak speed, down the second one: interpolated, to 1e-3 or so."""
     (up, v, a), (down, w, b) = (ramp.over_time() for ramp in ramps)
     first = ramps[0].extent[0]
     last = max(duration - ramps[1].extent[0], first)

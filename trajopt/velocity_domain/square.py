@@ -36,7 +36,7 @@ def least_square_power(axis: Axis) -> SquareOptimum:
     low = least_peak(axis)
 
     def surplus(peak: float) -> float:
-        return sum(ramp.extent[0] for ramp in _priced(axis, peak)) - axis.duration
+        return sum(ramp.shape.extent[0] for ramp in _priced(axis, peak)) - axis.duration
 
     ramps = _at_once(axis, low) or _priced(axis, rising_root(surplus, low * (1 + 1e-9), axis.velocity))
     peak, (up, down) = ramps[0].peak, ramps
@@ -51,7 +51,7 @@ def _at_once(axis: Axis, low: float) -> list[_Ramp]:
     def misses(x: float, z: float) -> tuple[float, float]:
         if not (low < x * mean < axis.velocity and abs(z) < 60):
             return inf, inf
-        times, lags = zip(*(ramp.extent for ramp in _ramps(axis, x * mean, natural * exp(z))), strict=True)
+        times, lags = zip(*(ramp.shape.extent for ramp in _ramps(axis, x * mean, natural * exp(z))), strict=True)
         return sum(times) / axis.duration - 1, sum(lags) / (axis.distance * (x - 1)) - 1
 
     found = common_root(misses, (1.4, 3.0))
@@ -69,7 +69,7 @@ def _priced(axis: Axis, peak: float) -> list[_Ramp]:
     target = peak * axis.duration - axis.distance
 
     def excess(z: float) -> float:
-        return log(sum(ramp.extent[1] for ramp in _ramps(axis, peak, exp(z))) / target)
+        return log(sum(ramp.shape.extent[1] for ramp in _ramps(axis, peak, exp(z))) / target)
 
     low = high = log(axis.mass**2 * peak**3 / axis.duration**2)
     while excess(high) > 0 and high < low + 60:
@@ -106,11 +106,6 @@ class _Ramp:
     acceleration: float
     peak: float
     price: float
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """(time, ∫(peak - v) dt)."""
-        return self.shape.extent
 
     @cached_property
     def shape(self) -> Ramp:
