@@ -17,7 +17,7 @@ from scipy import sparse
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 _CONCAVE: Final = "the square is bounded above, or its negative minimised: no convex program"
-_NONE: Final = np.empty(0, dtype=np.intp)
+NONE: Final = np.empty(0, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Affine:
     @classmethod
     def of(cls, x: Any) -> Affine:
         """An expression as it is, floats as a constant one."""
-        return x if isinstance(x, Affine) else cls(_NONE, _NONE, np.empty(0), np.array(x, dtype=float).reshape(-1))
+        return x if isinstance(x, Affine) else cls(NONE, NONE, np.empty(0), np.array(x, dtype=float).reshape(-1))
 
     @classmethod
     def variables(cls, first: int, count: int) -> Affine:
@@ -50,6 +50,12 @@ class Affine:
         return len(self.constant)
 
     def __getitem__(self, key: Any) -> Affine:
+        if isinstance(key, slice) and key.step is None and not self.squares:
+            start, stop, _ = key.indices(len(self))
+            if stop - start == len(self):
+                return self
+            kept = (self.rows >= start) & (self.rows < stop)
+            return Affine(self.rows[kept] - start, self.columns[kept], self.values[kept], self.constant[key])
         picked = np.atleast_1d(np.arange(len(self))[key])
         place = np.full(len(self), -1)
         place[picked] = np.arange(len(picked))
@@ -70,7 +76,7 @@ class Affine:
         return self * -1.0
 
     def __mul__(self, factor: Any) -> Affine:
-        if np.ndim(factor) == 0:
+        if isinstance(factor, float) or np.ndim(factor) == 0:
             squares = tuple((rows, weights * factor, of) for rows, weights, of in self.squares)
             return Affine(self.rows, self.columns, self.values * factor, self.constant * factor, squares)
         x = self.broadcast(len(factor))
@@ -119,7 +125,7 @@ class Affine:
         if self.squares:
             raise ValueError("the square of a square is no quadratic program")
         squares = ((np.arange(len(self)), np.ones(len(self)), self),)
-        return Affine(_NONE, _NONE, np.empty(0), np.zeros(len(self)), squares)
+        return Affine(NONE, NONE, np.empty(0), np.zeros(len(self)), squares)
 
     @property
     def affine(self) -> Affine:
@@ -129,7 +135,7 @@ class Affine:
     @property
     def convex(self) -> Affine:
         """The squares alone."""
-        return Affine(_NONE, _NONE, np.empty(0), np.zeros(len(self)), self.squares)
+        return Affine(NONE, NONE, np.empty(0), np.zeros(len(self)), self.squares)
 
     def quadratic(self, columns: int) -> tuple[sparse.csc_array, Floats, float]:
         """P, q and the constant of a single expression ½x'Px + q'x + constant. Raises ValueError where it is concave in
@@ -183,8 +189,8 @@ def stacked(parts: Sequence[Affine]) -> Affine:
     placed = list(zip(first, parts, strict=False))
     squares = [(at + rows, weights, of) for at, part in placed for rows, weights, of in part.squares]
     return Affine(
-        np.concatenate([_NONE, *(at + part.rows for at, part in placed)]),
-        np.concatenate([_NONE, *(part.columns for part in parts)]),
+        np.concatenate([NONE, *(at + part.rows for at, part in placed)]),
+        np.concatenate([NONE, *(part.columns for part in parts)]),
         np.concatenate([np.empty(0), *(part.values for part in parts)]),
         np.concatenate([np.empty(0), *(part.constant for part in parts)]),
         tuple(squares),

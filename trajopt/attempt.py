@@ -195,13 +195,11 @@ def _read(setting: Setting, transcript: Transcript, lowered: Lowered, outcome: O
         return Attempt(outcome)
     model = transcript.model
     duration = transcript.duration if isinstance(transcript.duration, float) else model.value(transcript.duration)
-    values = [model.value(x) for x in transcript.chain]
-    if not all(np.all(np.isfinite(x)) for x in values):
+    start = np.array([np.ravel(model.value(x[0]))[0] for x in transcript.chain[:-1]])
+    top = model.value(transcript.chain[-1])
+    if not (np.all(np.isfinite(start)) and np.all(np.isfinite(top))):
         return Attempt(Outcome(Claim.FAILED, outcome.raw_status + ", with non-finite values"))
-    start = np.array([x[0] for x in values[:-1]])
-    trajectory = rebuild(
-        setting.problem, setting.mesh, setting.scheme, setting.sizes, float(duration), start, values[-1]
-    )
+    trajectory = rebuild(setting.problem, setting.mesh, setting.scheme, setting.sizes, float(duration), start, top)
     return Attempt(
         outcome,
         trajectory,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from norms import Rows
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
 
 
 class Claim(Enum):
@@ -105,3 +106,29 @@ class Model(Rows, Protocol):
 def own_size(bound: Floats, size: float) -> Floats:
     """What a limit is measured in when widened or priced: its own value, or the signal's size where it is zero."""
     return np.abs(bound) if np.all(bound) else np.full(len(bound), size)
+
+
+@dataclass(frozen=True)
+class Side:
+    """Where one side of a limit is finite: ``name``, min or max; ``sign``, -1 or 1; ``at``, a slice or indices; and the
+    limits there."""
+
+    name: str
+    sign: float
+    at: Any
+    limits: Floats
+
+
+def finite_sides(lower: Floats, upper: Floats, size: float) -> tuple[list[Side], float]:
+    """The sides of a limit that are finite somewhere, and what divides the rows of both: the size of the signal, or the
+    limit where that is larger."""
+    found = []
+    for name, sign, bound in (("min", -1.0, lower), ("max", 1.0, upper)):
+        at: Any = np.flatnonzero(np.isfinite(bound))
+        if not len(at):
+            continue
+        if at[-1] - at[0] == len(at) - 1:
+            at = slice(int(at[0]), int(at[-1]) + 1)
+        found.append(Side(name, sign, at, bound[at]))
+        size = max(size, float(np.abs(found[-1].limits).max()))
+    return found, size

@@ -1,4 +1,4 @@
-"""Convex models: PIQP, Clarabel or OSQP through CVXPY's interfaces to them. The only file that imports cvxpy.
+"""Convex models: Clarabel or OSQP through CVXPY's interfaces to them, or PIQP. The only file that imports cvxpy.
 
 The program is collected as rows of one sparse matrix (`trajopt.affine`) and goes to CVXPY as the cone program that its
 own canonicalisation would arrive at: that took ten times as long as solving it.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from time import perf_counter
 from types import SimpleNamespace
 from typing import Any, Final
@@ -18,10 +17,10 @@ import numpy as np
 from cvxpy.reductions.solvers.defines import SOLVER_MAP_CONIC, SOLVER_MAP_QP
 from scipy import sparse
 
-from trajopt import certificate
-from trajopt.affine import Affine, in_cones, stacked
+from trajopt import certificate, piqp
+from trajopt.affine import NONE, Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size
+from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, own_size, finite_sides
 
 cp: Any = cvxpy  # its atoms are exported in a way that type checkers do not see
 _CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
@@ -50,7 +49,7 @@ RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, 
 QUADRATIC: Final = ("piqp", "piqp-firm")  # the rungs for linear and quadratic programs
 LADDER: Final = (*QUADRATIC, "clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
 SOLVERS: Final[dict[str, Any]] = {
-    "PIQP": SOLVER_MAP_QP["PIQP"], "CLARABEL": SOLVER_MAP_CONIC["CLARABEL"], "OSQP": SOLVER_MAP_QP["OSQP"]
+    "CLARABEL": SOLVER_MAP_CONIC["CLARABEL"], "OSQP": SOLVER_MAP_QP["OSQP"]
 }
 
 
@@ -67,6 +66,7 @@ class ConvexModel:
         self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
+        self._opposite = NONE, NONE  # rows below zero, and those with the same coefficients but for the sign
         self._answer: Floats | None = None
 
     def copied(self) -> ConvexModel:
@@ -82,14 +82,11 @@ class ConvexModel:
         self, count: int, size: float, lower: Floats, upper: Floats, name: str = "", at: Any = None, origin: float = 0.0
     ) -> Any:
         x = self.variable(count) * size
-        for bound, sign, side in ((lower, -1.0, "min"), (upper, 1.0, "max")):
-            active = np.flatnonzero(np.isfinite(bound))
-            if len(active):
-                some = x if len(active) == count else x[active]
-                limit = bound[active]
-                key, where = (f"{name}.{side}", at[active]) if at is not None else ("", None)
-                row_size = max(size, float(np.max(np.abs(limit))))
-                self._below(sign * some - sign * limit, row_size, key, where, own_size(limit + origin, size))
+        sides, row_size = finite_sides(lower, upper, size)
+        for side in sides:
+            key, where = (f"{name}.{side.name}", at[side.at]) if at is not None else ("", None)
+            residual = side.sign * x[side.at] - side.sign * side.limits
+            self._below(residual, row_size, key, where, own_size(side.limits + origin, size))
         return x
 
     def variable(self, count: int) -> Affine:
@@ -162,6 +159,7 @@ class ConvexModel:
     @cached_property
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
+        self._opposite = _opposites(self._rows["below"].parts)
         equal, below, inside = (stacked(rows.parts) for rows in self._rows.values())
         rows = stacked([equal, below, inside * -1.0])
         P, q, self._constant = self._objective.quadratic(self._count)
@@ -174,22 +172,16 @@ class ConvexModel:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
         verified; the bound is recomputed from the duals, no closer than to a relative ``gap``, and without more effort
         where it lies ``above`` that value; a value that does not needs none then."""
-        started = perf_counter()
-        name, program = solver.partition("-")[0].upper(), self.program
-        interface, options = SOLVERS[name], dict(_SETTINGS[solver])
-        if seconds is not None and name != "PIQP":  # which knows no limit, but takes few iterations
-            options["time_limit"] = seconds
-        if not interface.is_installed():
-            raise MissingSolver(f"{solver} is not installed; 'pip install {solver}' or 'make demo' brings it")
-        if "kkt_solver" in options:
-            options["kkt_solver"] = getattr(import_module("piqp").KKTSolver, options["kkt_solver"])
-        if name in SOLVER_MAP_QP and program.cones:
+        started, name, program = perf_counter(), solver.partition("-")[0], self.program
+        if program.cones and name != "clarabel":
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
-        raw = interface.solve_via_data(_data(name, program), False, False, options)
-        status, iterations, x, z = _read(interface, raw)
+        try:
+            claim, status, iterations, x, z = _ended(name, program, self._opposite, _SETTINGS[solver], seconds)
+        except ImportError as missing:
+            raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()
-        claim, value, bound = _CLAIMS.get(status, Claim.FAILED), np.nan, -np.inf
-        if name == "PIQP" and seconds is not None and solved - started > seconds:
+        value, bound = np.nan, -np.inf
+        if name == "piqp" and seconds is not None and solved - started > seconds:
             claim = Claim.LIMIT
         if claim is Claim.INFEASIBLE and not certificate.is_infeasible(program, z):
             claim = Claim.FAILED
@@ -204,7 +196,7 @@ class ConvexModel:
             forgiven = _EXCESS * float(np.abs(z).sum())
         return Outcome(
             claim, status, value, iterations, ended - started, bound, forgiven,
-            self._prices(z[program.zero :]), self._pair(x, z), name.lower(), ended - solved,
+            self._prices(z[program.zero :]), self._pair(x, z), name, ended - solved,
         )  # fmt: skip
 
     def _pair(self, x: Floats, z: Floats) -> Pair:
@@ -251,10 +243,31 @@ _CLAIMS: Final = {
 }
 
 
-def _data(name: str, program: certificate.ConeProgram) -> dict[str, Any]:
+def _ended(
+    solver: str,
+    program: certificate.ConeProgram,
+    opposite: tuple[Integers, Integers],
+    settings: dict[str, Any],
+    seconds: float | None,
+) -> tuple[Claim, str, int, Floats, Floats]:
+    """How a run ended: the claim, the solver's word, its iterations, and the primal and dual vectors."""
+    if solver == "piqp":  # which knows no time limit, but takes few iterations
+        return piqp.solve(program, opposite, settings)
+    limit = {} if seconds is None else {"time_limit": seconds}
+    interface = SOLVERS[solver.upper()]
+    raw = interface.solve_via_data(_data(solver, program), False, False, settings | limit)
+    if solver == "osqp":
+        status, iterations, z = interface.STATUS_MAP.get(raw.info.status_val), raw.info.iter, raw.y
+    else:
+        status, iterations, z = interface.STATUS_MAP.get(str(raw.status)), raw.iterations, raw.z
+    x, z = (np.array(part, dtype=float) for part in (raw.x, z))  # copies: a view keeps the solver's memory
+    return _CLAIMS.get(status, Claim.FAILED), status or cp.SOLVER_ERROR, iterations, x, z
+
+
+def _data(solver: str, program: certificate.ConeProgram) -> dict[str, Any]:
     """The program under the names that CVXPY's interfaces read."""
     P, A, b, zero = program.P, program.A, program.b, program.zero
-    if name in SOLVER_MAP_QP:
+    if solver == "osqp":
         equal, below = (sparse.csc_array(rows) for rows in (A[:zero], A[zero:]))
         return {"P": P, "q": program.q, "A": equal, "b": b[:zero], "F": below, "G": b[zero:]}
     dims = SimpleNamespace(
@@ -263,15 +276,22 @@ def _data(name: str, program: certificate.ConeProgram) -> dict[str, Any]:
     return {"P": P, "c": program.q, "A": sparse.csc_array(A), "b": b, "dims": dims}
 
 
-def _read(interface: Any, raw: Any) -> tuple[str, int, Floats, Floats]:
-    """CVXPY's word for how a run ended, its iterations, and the primal and dual vectors."""
-    if interface.name() == "OSQP":
-        status, iterations, z = interface.STATUS_MAP.get(raw.info.status_val), raw.info.iter, raw.y
-    elif interface.name() == "PIQP":
-        status, iterations = interface.STATUS_MAP.get(raw.info.status.name), raw.info.iter
-        status = cp.SOLVER_ERROR if status == cp.USER_LIMIT else status  # out of iterations: the next one may do better
-        z = np.concatenate([raw.y, raw.z_u])
-    else:
-        status, iterations, z = interface.STATUS_MAP.get(str(raw.status)), raw.iterations, raw.z
-    x, z = (np.array(part, dtype=float) for part in (raw.x, z))  # copies: a view keeps the solver's memory
-    return status or cp.SOLVER_ERROR, iterations, x, z
+def _opposites(parts: list[Affine]) -> tuple[Integers, Integers]:
+    """(n,) rows of stacked parts, and (n,) those which, but for their constants, are their negatives: the two sides of
+    a limit, one part after the other."""
+    first, second, at = [NONE], [NONE], 0
+    previous: Affine | None = None
+    for part in parts:
+        before, previous = previous, part
+        if before is not None and _are_opposite(before, part):
+            second.append(np.arange(at, at + len(part)))
+            first.append(second[-1] - len(part))
+            previous = None
+        at += len(part)
+    return np.concatenate(first), np.concatenate(second)
+
+
+def _are_opposite(a: Affine, b: Affine) -> bool:
+    return len(a) == len(b) and all(
+        np.array_equal(x, y) for x, y in ((a.rows, b.rows), (a.columns, b.columns), (a.values, -b.values))
+    )

@@ -14,7 +14,7 @@ from pyomo.common.modeling import unique_component_name
 from trajopt.along import Along, curved
 from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size
+from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size, finite_sides
 from trajopt.signals import Smoothed
 
 _OPTIONS: Final = {
@@ -86,12 +86,10 @@ class NonconvexModel(Smoothed):
     def _bounded(
         self, variables: Any, name: str, size: float, bounds: tuple[Floats, Floats], at: Floats, origin: float
     ) -> None:
-        for side, bound in (("min", bounds[0]), ("max", bounds[1])):
-            active = np.flatnonzero(np.isfinite(bound))
-            if len(active):
-                some = [variables[int(k)] for k in active]
-                own = own_size(bound[active] + origin, size)
-                self._named.append((f"{name}.{side}", some, size, at[active], own))
+        for side in finite_sides(*bounds, size)[0]:
+            some = [variables[int(k)] for k in np.arange(len(at))[side.at]]
+            own = own_size(side.limits + origin, size)
+            self._named.append((f"{name}.{side.name}", some, size, at[side.at], own))
 
     def _add(self, variables: Any, count: int, size: float, name: str = "") -> Any:
         name = unique_component_name(self._model, name or "x")  # axes have variables of one name

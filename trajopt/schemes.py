@@ -25,15 +25,16 @@ class Scheme:
     terms: int
     accuracy: int
 
-    def advance(self, model: Arithmetic, chain: list[Any], i: int, steps: Any) -> Any:
-        """(N,) the i-th derivative at the right ends of the intervals, from the chain at the left ends.
+    def change(self, model: Arithmetic, chain: list[Any], i: int, steps: Any) -> Any:
+        """(N,) by how much the i-th derivative grows over the intervals, from the chain above it at the left ends.
 
         ``chain[i]`` holds (N+1,) node values below the order and (N,) interval values at the order; ``steps`` (N,) s.
         """
-        value = chain[i][:-1]
+        value: Any = None
         for r in range(1, min(self.terms, len(chain) - 1 - i) + 1):
             left = chain[i + r] if i + r == len(chain) - 1 else chain[i + r][:-1]
-            value = value + model.times(steps**r / factorial(r), left)
+            part = model.times(steps**r / factorial(r), left)
+            value = part if value is None else value + part
         return value
 
     def signal(self, model: Arithmetic, chain: list[Any], i: int, steps: Any) -> Signal:

@@ -16,6 +16,8 @@ from trajopt.checker.case import Array
 from trajopt.checker.report import to_float
 
 _DIVISION = 800  # what changes its sign and back within a tenth of such a part is nothing
+_PARTS = 8  # into which a piece is split at a time, where it must be
+_ROUNDS = 20  # of splitting: no part is longer than 2^-60 then
 Integers: TypeAlias = NDArray[np.intp]
 Poly: TypeAlias = tuple[list[int], int]  # coefficients of powers (or Bernstein polynomials) of s, over one denominator
 
@@ -49,14 +51,26 @@ def _bernstein_matrix(degree: int) -> Array:
     return np.array([row + [0] * (len(table) - len(row)) for row in table], dtype=np.float64).T / divisor
 
 
-def _halves(rows: Array) -> Array:
-    """Bernstein coefficients on both halves (de Casteljau): all left ones, then all right ones."""
-    count, width = rows.shape
-    found, row = np.empty((2 * count, width)), rows
-    for i in range(width):
-        found[:count, i], found[count:, width - 1 - i] = row[:, 0], row[:, -1]
-        row = (row[:, 1:] + row[:, :-1]) / 2
-    return found
+def _parts(rows: Array) -> Array:
+    """Bernstein coefficients on each of ``_PARTS`` parts of the pieces, part by part of the first, then of the next."""
+    return (rows @ _to_parts(rows.shape[1] - 1)).reshape(-1, rows.shape[1])
+
+
+@cache
+def _to_parts(degree: int) -> Array:
+    """By de Casteljau's halves of halves: sums of powers of two, exact."""
+    parts = [np.eye(degree + 1)]
+    while len(parts) < _PARTS:
+        parts = [half for part in parts for half in _halves(part)]
+    return np.concatenate(parts, axis=1)
+
+
+def _halves(rows: Array) -> tuple[Array, Array]:
+    left, right = np.empty_like(rows), np.empty_like(rows)
+    for i in range(rows.shape[1]):
+        left[:, i], right[:, -1 - i] = rows[:, 0], rows[:, -1]
+        rows = (rows[:, 1:] + rows[:, :-1]) / 2
+    return left, right
 
 
 def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, float]:
@@ -64,9 +78,9 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
 
     Returns the value, the index of the polynomial and s. NaN when it cannot be told, for rounding.
     """
-    best, where, crowd = 0.0, (0, 0.0), 4 * len(rows) + 1000
+    best, where, crowd = 0.0, (0, 0.0), 2 * _PARTS * len(rows) + 1000
     index, start, width = np.arange(len(rows)), np.zeros(len(rows)), 1.0
-    for _ in range(60):
+    for _ in range(_ROUNDS):
         ends = np.maximum(rows[:, 0], rows[:, -1])
         k = int(np.argmax(ends))
         if ends[k] > best:
@@ -77,8 +91,9 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
             return best, *where
         if np.count_nonzero(still_open) > crowd or not math.isfinite(float(bounds.max())):
             break
-        rows, width = _halves(rows[still_open]), width / 2
-        index, start = np.tile(index[still_open], 2), np.concatenate([start[still_open], start[still_open] + width])
+        rows, width = _parts(rows[still_open]), width / _PARTS
+        index = np.repeat(index[still_open], _PARTS)
+        start = np.add.outer(start[still_open], width * np.arange(_PARTS)).ravel()
     return math.nan, *where
 
 
@@ -87,14 +102,14 @@ def absolute_integral(rows: Array, length: Array) -> float:
     total, slack = 0.0, 1e-13 * np.abs(rows).max()
     enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
     share = np.linspace(0.0, 1.0, rows.shape[1])
-    for _ in range(60):
+    for _ in range(_ROUNDS):
         whole = (rows.min(axis=1) >= -slack) | (rows.max(axis=1) <= slack)
         total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
         rows, length = rows[~whole], length[~whole]
         apart = rows - np.outer(rows[:, 0], 1 - share) - np.outer(rows[:, -1], share)
         if np.abs(apart).max(axis=1, initial=0.0) @ length <= enough:  # the integrals differ by no more
             break
-        rows, length = _halves(rows), np.tile(length / 2, 2)
+        rows, length = _parts(rows), np.repeat(length / _PARTS, _PARTS)
     first, last = rows[:, 0], rows[:, -1]
     crossing = first * last < 0
     straight = np.abs(first + last) / 2
