@@ -147,7 +147,7 @@ def test_checking_what_is_no_result_is_one_line_and_exit_2(tmp_path: Path) -> No
         assert done.returncode == 2 and len(done.stderr.strip().splitlines()) == 1
 
 
-LONG = ("--set", "objective.minimize=power", "--set", "transcription.intervals=20000")
+LONG = ("--set", "objective.minimize=power", "--set", "transcription.intervals=50000")
 
 
 @pytest.mark.parametrize("solver", ["auto", "ipopt"])

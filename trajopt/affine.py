@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +19,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 _CONCAVE: Final = "the square is bounded above, or its negative minimised: no convex program"
 NONE: Final = np.empty(0, dtype=np.intp)
+
+
+@lru_cache(maxsize=16)
+def _each(count: int) -> Integers:
+    return np.arange(count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +49,24 @@ class Affine:
     @classmethod
     def variables(cls, first: int, count: int) -> Affine:
         """``count`` elements of the stacked variable, from the ``first``."""
-        rows = np.arange(count)
+        rows = _each(count)
         return cls(rows, first + rows, np.ones(count), np.zeros(count))
 
     def __len__(self) -> int:
         return len(self.constant)
+
+    @property
+    def _plain(self) -> bool:
+        """Whether, to be seen at once, every row has one entry, in their order."""
+        return self.rows is _each(len(self))
 
     def __getitem__(self, key: Any) -> Affine:
         if isinstance(key, slice) and key.step is None and not self.squares:
             start, stop, _ = key.indices(len(self))
             if stop - start == len(self):
                 return self
+            if self._plain:
+                return Affine(_each(stop - start), self.columns[key], self.values[key], self.constant[key])
             kept = (self.rows >= start) & (self.rows < stop)
             return Affine(self.rows[kept] - start, self.columns[kept], self.values[kept], self.constant[key])
         picked = np.atleast_1d(np.arange(len(self))[key])
@@ -81,7 +94,8 @@ class Affine:
             return Affine(self.rows, self.columns, self.values * factor, self.constant * factor, squares)
         x = self.broadcast(len(factor))
         squares = tuple((rows, weights * factor[rows], of) for rows, weights, of in x.squares)
-        return Affine(x.rows, x.columns, x.values * factor[x.rows], x.constant * factor, squares)
+        values = x.values * (factor if x._plain else factor[x.rows])
+        return Affine(x.rows, x.columns, values, x.constant * factor, squares)
 
     __rmul__ = __mul__
 

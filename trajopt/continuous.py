@@ -218,7 +218,7 @@ def _on_mesh(trajectory: Trajectory) -> dict[str, Any]:
 
 def _middles(trajectory: Trajectory, name: str) -> Any:
     """(N,) a signal in the middle of the intervals, roughly: the mean of its Bernstein coefficients."""
-    return np.mean(np.stack(np.broadcast_arrays(*trajectory.signal(name).pieces)), axis=0)
+    return np.mean(trajectory.signal(name).rows, axis=0)
 
 
 def _on_limit(problem: Problem, name: str, value: float) -> bool:

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.polynomial import polynomial
+from numpy.typing import NDArray
 
 from trajopt import motor, vibration
 from trajopt.mesh import Floats
@@ -96,7 +97,7 @@ def peak(signal: Signal) -> float:
     """max|x| at every instant, or at the nodes where only they mean something."""
     if not signal.pieces:
         return float(np.max(np.abs(signal.nodes)))
-    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    pieces = signal.rows
     best = float(np.max(np.abs(pieces[[0, -1]])))
     doubtful = pieces[:, np.max(np.abs(pieces), axis=0) > best]  # a polynomial lies within its coefficients
     if not doubtful.size:
@@ -111,7 +112,7 @@ def rms(trajectory: Trajectory, signal: Signal) -> float:
     """sqrt((1/T)∫x²dt)."""
     if not signal.pieces:
         return float(np.sqrt(np.trapezoid(np.square(signal.nodes), trajectory.time) / trajectory.duration))
-    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    pieces = signal.rows
     squares = np.sum(pieces * (_products(signal.degree) @ pieces), axis=0)
     return float(np.sqrt(np.diff(trajectory.time) @ squares / trajectory.duration))
 
@@ -121,7 +122,7 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
     if not signal.pieces:
         x = np.abs(signal.nodes)
         return float(np.diff(trajectory.time) @ x[:-1] if plain else np.trapezoid(x, trajectory.time))
-    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    pieces = signal.rows
     total = np.abs(_integrals(trajectory, signal))
     steps = np.diff(trajectory.time)
     mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
@@ -134,7 +135,7 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
 
 def _reversals(trajectory: Trajectory, name: str) -> Floats:
     """The times at which a signal changes its sign between nodes, s."""
-    pieces = np.stack(np.broadcast_arrays(*trajectory.signal(name).pieces))
+    pieces = trajectory.signal(name).rows
     time = trajectory.time
     mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
     places = _roots_inside(_power_form(pieces[:, mixed]))
@@ -143,8 +144,7 @@ def _reversals(trajectory: Trajectory, name: str) -> Floats:
 
 def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
     """(N,) the integral over each interval: its length times the mean Bernstein coefficient."""
-    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
-    integrals: Floats = np.diff(trajectory.time) * pieces.mean(axis=0)
+    integrals: Floats = np.diff(trajectory.time) * signal.rows.mean(axis=0)
     return integrals
 
 
@@ -168,17 +168,30 @@ def _power_form(bernstein: Floats) -> Floats:
 
 
 def _roots_inside(power: Floats) -> Floats:
-    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted, as eigenvalues of their companions; 1 where
-    there are fewer."""
+    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted; 1 where there are fewer."""
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
     for n in np.unique(degree[degree > 0]):
         columns = np.flatnonzero(degree == n)
-        companion = np.zeros((len(columns), n, n))
-        companion[:, 1:, :-1] = np.eye(n - 1)
-        companion[:, :, -1] = -(power[:n, columns] / power[n, columns]).T
-        roots = np.linalg.eigvals(companion)
+        roots = _roots(power[:n, columns] / power[n, columns])
         inside = (np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)
         found[:n, columns] = np.sort(np.where(inside, roots.real, 1.0), axis=1).T
     return found
+
+
+def _roots(monic: Floats) -> NDArray[np.complex128]:
+    """(m, n) the roots of m polynomials of degree n, from their (n, m) lower coefficients; above a quadratic as
+    eigenvalues of their companions."""
+    n, m = monic.shape
+    if n == 1:
+        return -monic.T.astype(complex)
+    if n == 2:
+        half = monic[1] / -2
+        root = np.sqrt((half**2 - monic[0]).astype(complex))
+        larger = half + np.where(half < 0, -root, root)
+        return np.stack([larger, monic[0] / np.where(larger == 0, 1.0, larger)], axis=1)
+    companion = np.zeros((m, n, n))
+    companion[:, 1:, :-1] = np.eye(n - 1)
+    companion[:, :, -1] = -monic.T
+    return np.asarray(np.linalg.eigvals(companion), dtype=complex)

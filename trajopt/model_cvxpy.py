@@ -20,7 +20,7 @@ from scipy import sparse
 from trajopt import certificate, piqp
 from trajopt.affine import NONE, Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, own_size, finite_sides
+from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
 
 cp: Any = cvxpy  # its atoms are exported in a way that type checkers do not see
 _CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
@@ -85,8 +85,8 @@ class ConvexModel:
         sides, row_size = finite_sides(lower, upper, size)
         for side in sides:
             key, where = (f"{name}.{side.name}", at[side.at]) if at is not None else ("", None)
-            residual = side.sign * x[side.at] - side.sign * side.limits
-            self._below(residual, row_size, key, where, own_size(side.limits + origin, size))
+            rows = x[side.at] * (side.sign / row_size) - side.limits * (side.sign / row_size)
+            self._below(rows, row_size, key, where, own_size(side.limits + origin, size))
         return x
 
     def variable(self, count: int) -> Affine:
@@ -101,10 +101,10 @@ class ConvexModel:
         self._asked[1].append(("equal", self._rows["equal"].add(Affine.of(residual) / size)))
 
     def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> None:
-        self._asked[1].append(("below", self._below(residual, size, name, at, own)))
+        self._asked[1].append(("below", self._below(Affine.of(residual) / size, size, name, at, own)))
 
-    def _below(self, residual: Any, size: float, name: str, at: Any, own: Any) -> slice:
-        rows = Affine.of(residual) / size
+    def _below(self, rows: Affine, size: float, name: str, at: Any, own: Any) -> slice:
+        """Rows that have been divided by ``size``."""
         if rows.squares:  # bounded by variables: measured, with the cones on their own the duals are more exact
             bound = self._unasked(len(rows))
             self._add_cones(*in_cones(rows.convex - bound))
@@ -160,13 +160,13 @@ class ConvexModel:
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
         self._opposite = _opposites(self._rows["below"].parts)
-        equal, below, inside = (stacked(rows.parts) for rows in self._rows.values())
-        rows = stacked([equal, below, inside * -1.0])
+        equal, below, inside = self._rows.values()
+        rows = stacked([*equal.parts, *below.parts, *(part * -1.0 for part in inside.parts)])
         P, q, self._constant = self._objective.quadratic(self._count)
         A = rows.matrix(self._count)
         for kind in self._rows.values():
             kind.parts = []  # the memory of large meshes
-        return certificate.ConeProgram(P, q, A, -rows.constant, len(equal), len(below), tuple(self._sizes))
+        return certificate.ConeProgram(P, q, A, -rows.constant, equal.count, below.count, tuple(self._sizes))
 
     def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been

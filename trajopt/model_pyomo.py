@@ -14,7 +14,7 @@ from pyomo.common.modeling import unique_component_name
 from trajopt.along import Along, curved
 from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Outcome, Pair, Prices, own_size, finite_sides
+from trajopt.model import Claim, Floats, Outcome, Pair, Prices, finite_sides, own_size
 from trajopt.signals import Smoothed
 
 _OPTIONS: Final = {

@@ -31,22 +31,32 @@ def solve(
     solver = piqp.SparseSolver()
     for name, value in settings.items():
         setattr(solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
-    A, zero = program.A, program.zero
+    zero, (first, second) = program.zero, opposite
     upper = program.b[zero:]
     lower, kept = np.full(len(upper), -_INFINITE), np.ones(len(upper), dtype=bool)
-    first, second = opposite
     lower[first], kept[second] = -upper[second], False
     rows = np.flatnonzero(kept)
-    equal, within = sparse.csc_array(A[:zero]), sparse.csc_array(A[zero + rows])
-    solver.setup(
-        P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows]
-    )  # fmt: skip
+    equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
+    solver.setup(P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows])
     solver.solve()
     result = solver.result
-    dual = np.zeros(len(program.b))
-    dual[:zero], dual[zero + rows] = result.y, result.z_u
-    at_lower = np.zeros(len(upper))
-    at_lower[rows] = result.z_l
-    dual[zero + second] = at_lower[first]
+    at_upper, at_lower = np.zeros(len(upper)), np.zeros(len(upper))
+    at_upper[rows], at_lower[rows] = result.z_u, result.z_l
+    at_upper[second] = at_lower[first]
+    dual = np.concatenate([result.y, at_upper])
     status = result.info.status.name
     return _CLAIMS.get(status, Claim.FAILED), status, result.info.iter, np.array(result.x), dual
+
+
+def _by_columns(A: sparse.csr_array, parts: list[Integers]) -> list[sparse.csc_array]:
+    """Some rows of A, and others, by columns: scipy takes as long to pick each as to turn all of it."""
+    turned = A.tocsc()
+    found = []
+    for rows in parts:
+        place = np.full(A.shape[0], -1, dtype=turned.indices.dtype)
+        place[rows] = np.arange(len(rows))
+        places = place[turned.indices]
+        entries = np.flatnonzero(places >= 0)
+        first = np.searchsorted(entries, turned.indptr)
+        found.append(sparse.csc_array((turned.data[entries], places[entries], first), (len(rows), A.shape[1])))
+    return found

@@ -11,6 +11,8 @@ from trajopt.schemes import Scheme
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import node_limits, prescribed
 
+_ROUNDING = 1e-15  # of a condition, over its size: no correction comes closer
+
 
 def rebuild(
     problem: Problem, mesh: Mesh, scheme: Scheme, sizes: Sizes, duration: float, start: Floats, top: Floats
@@ -32,11 +34,13 @@ def rebuild(
     top = np.clip(top, lower, upper)
     order = problem.order
     effects = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
-    for _ in range(2 if conditions else 0):  # the second pass removes the rounding of the first
-        chain = scheme.rollout(start, top, steps)
-        miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
-        top = top + _correction(effects, miss, np.minimum(upper - top, top - lower) / sizes.derivative[order])
     chain = scheme.rollout(start, top, steps)
+    for _ in range(2):  # the second pass removes the rounding of the first
+        miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
+        if np.max(np.abs(miss), initial=0.0) <= _ROUNDING:
+            break
+        top = top + _correction(effects, miss, np.minimum(upper - top, top - lower) / sizes.derivative[order])
+        chain = scheme.rollout(start, top, steps)
     for node, i, value in conditions:
         if node == mesh.intervals and abs(chain[i][node] - value) <= 1e-11 * sizes.derivative[i]:
             chain[i][node] = value

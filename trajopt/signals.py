@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb, sqrt
 from operator import add
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -113,6 +114,11 @@ class Signal:
     def degree(self) -> int:
         """Degree of the interval polynomials."""
         return len(self.pieces) - 1
+
+    @cached_property
+    def rows(self) -> NDArray[np.float64]:
+        """(degree + 1, N) the pieces of a signal of floats."""
+        return np.stack(np.broadcast_arrays(*self.pieces))
 
     def samples(self, model: Arithmetic) -> Any:
         """The values a norm sees: at the nodes, or on the intervals, or at both ends of every interval."""

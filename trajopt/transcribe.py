@@ -13,7 +13,7 @@ from trajopt import vibration
 from trajopt.envelope import Envelope
 from trajopt.fields import Limit, Table
 from trajopt.mesh import LARGE, Floats, Mesh, mesh_for
-from trajopt.model import own_size, finite_sides
+from trajopt.model import finite_sides, own_size
 from trajopt.problem import DERIVATIVES, Problem
 from trajopt.quantities import Quantities
 from trajopt.scaling import Sizes, sizes_of
@@ -249,10 +249,10 @@ def _limit(transcript: Transcript, name: str, limit: Limit) -> None:
 def _hold(transcript: Transcript, name: str, signal: Signal, limit: Limit) -> None:
     problem, mesh, duration = transcript.problem, transcript.mesh, transcript.duration
     i = DERIVATIVES.index(name) if name in DERIVATIVES else -1
-    if i >= 0:
+    if i >= 0 and transcript.widen:  # else the bounds of the variables hold it there
         at_nodes, places = node_limits(problem, i, mesh, duration), mesh.places(top=i == problem.order)
         _rows(transcript, name, transcript.chain[i], at_nodes, places, only=transcript.widen)
-    elif signal.nodes is not None:
+    elif i < 0 and signal.nodes is not None:
         _rows(transcript, name, signal.nodes, sides(problem, i, limit, duration, mesh.fractions), mesh.fractions)
     if i == problem.order:
         return  # the top derivative is constant on intervals: nothing is left to hold

@@ -85,7 +85,7 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
         k = int(np.argmax(ends))
         if ends[k] > best:
             best, where = float(ends[k]), (int(index[k]), float(start[k] + (0.0 if rows[k, 0] == ends[k] else width)))
-        bounds = rows.max(axis=1)
+        bounds = _greatest(rows)
         still_open = ~(bounds <= best + slack + relative * best)
         if not still_open.any():
             return best, *where
@@ -97,17 +97,25 @@ def highest(rows: Array, slack: float, relative: float) -> tuple[float, int, flo
     return math.nan, *where
 
 
+def _greatest(rows: Array) -> Array:
+    """The greatest of every row: for short ones, and many, quicker than numpy's."""
+    found = rows[:, 0]
+    for column in rows.T[1:]:
+        found = np.maximum(found, column)
+    return found
+
+
 def absolute_integral(rows: Array, length: Array) -> float:
     """The integral of |p| over all pieces, split where p changes its sign until its chord does for it."""
     total, slack = 0.0, 1e-13 * np.abs(rows).max()
     enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
     share = np.linspace(0.0, 1.0, rows.shape[1])
     for _ in range(_ROUNDS):
-        whole = (rows.min(axis=1) >= -slack) | (rows.max(axis=1) <= slack)
+        whole = (_greatest(-rows) <= slack) | (_greatest(rows) <= slack)
         total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
         rows, length = rows[~whole], length[~whole]
         apart = rows - np.outer(rows[:, 0], 1 - share) - np.outer(rows[:, -1], share)
-        if np.abs(apart).max(axis=1, initial=0.0) @ length <= enough:  # the integrals differ by no more
+        if _greatest(np.abs(apart)) @ length <= enough:  # the integrals differ by no more
             break
         rows, length = _parts(rows), np.repeat(length / _PARTS, _PARTS)
     first, last = rows[:, 0], rows[:, -1]

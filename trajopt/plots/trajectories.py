@@ -191,7 +191,7 @@ def curve(trajectory: Trajectory, name: str) -> tuple[Floats, Floats]:
         signal = trajectory.signal(name)
     if not signal.pieces:
         return trajectory.time, signal.nodes + origin
-    pieces = np.stack(np.broadcast_arrays(*signal.pieces))
+    pieces = signal.rows
     count = 2 if signal.degree == 0 else int(np.clip(POINTS // trajectory.mesh.intervals, 2, 200))
     fractions = np.linspace(0.0, 1.0, count)
     n = signal.degree
