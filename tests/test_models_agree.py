@@ -9,6 +9,8 @@ import pytest
 
 import trajopt
 from tests.conftest import axis, solved, term
+from trajopt.model_cvxpy import ConvexModel
+from trajopt.transcribe import Setting, transcribe
 
 LIMITS = {"velocity": (-0.1, 1.7), "acceleration": (-9.0, 7.0), "jerk": (-90.0, 70.0)}
 LOAD = {"inertia": 2.0, "viscous": 3.0}
@@ -130,6 +132,30 @@ def test_solvers_agree_on_quadratic_programs(case: str) -> None:
     clarabel, piqp, osqp = (solution.objective for solution in found)
     assert piqp == pytest.approx(clarabel, rel=1e-8)
     assert osqp == pytest.approx(clarabel, rel=1e-6)
+
+
+@pytest.mark.parametrize("limits", [LIMITS, {"velocity": 1.7, "acceleration": (-9.0, 6.5), "jerk": 60.0}])
+def test_multipliers_of_rows_with_two_sides_are_those_of_two_rows(limits: dict[str, Any]) -> None:
+    found = [solved(axis("jerk", "l2", limits=limits, intervals=30, solver=solver)) for solver in ("piqp", "clarabel")]
+    piqp, clarabel = ({row["name"]: row["per_unit"] for row in solution.prices} for solution in found)
+    assert piqp == pytest.approx(clarabel, rel=1e-5, abs=1e-7) and any(piqp.values())
+
+
+def test_piqp_gets_one_row_for_both_sides_of_a_limit() -> None:
+    """And no row, and no variable, for position between the ends."""
+    model, count = ConvexModel(), 30
+    free = axis("jerk", "l2", limits=LIMITS, intervals=count)
+    transcribe(Setting.of(free), model, 1.0)
+    program, (first, second) = model.program, model.opposite
+    inequalities = program.A[program.zero :]
+    assert abs(inequalities[first] + inequalities[second]).max() == 0.0
+    assert len(second) == len(inequalities.toarray()) / 2
+    assert program.A.shape[1] == 2 + 2 * (count + 1) + count
+    limited = axis("jerk", "l2", limits={**LIMITS, "position": (-9.0, 9.0)}, intervals=count)
+    transcribe(Setting.of(limited), whole := ConvexModel(), 1.0)
+    assert whole.program.A.shape[1] == program.A.shape[1] + count - 1
+    found = [solved(problem).objective for problem in (limited, free)]
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
 
 
 def test_a_large_mesh_is_solved_by_the_firm_setting() -> None:

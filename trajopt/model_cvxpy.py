@@ -66,7 +66,7 @@ class ConvexModel:
         self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
-        self._opposite = NONE, NONE  # rows below zero, and those with the same coefficients but for the sign
+        self.opposite = NONE, NONE  # rows below zero, and those with the same coefficients but for the sign
         self._answer: Floats | None = None
 
     def copied(self) -> ConvexModel:
@@ -159,7 +159,7 @@ class ConvexModel:
     @cached_property
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
-        self._opposite = _opposites(self._rows["below"].parts)
+        self.opposite = _opposites(self._rows["below"].parts)
         equal, below, inside = self._rows.values()
         rows = stacked([*equal.parts, *below.parts, *(part * -1.0 for part in inside.parts)])
         P, q, self._constant = self._objective.quadratic(self._count)
@@ -176,7 +176,7 @@ class ConvexModel:
         if program.cones and name != "clarabel":
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
         try:
-            claim, status, iterations, x, z = _ended(name, program, self._opposite, _SETTINGS[solver], seconds)
+            claim, status, iterations, x, z = _ended(name, program, self.opposite, _SETTINGS[solver], seconds)
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()
