@@ -92,7 +92,8 @@ def convex(
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
     """
-    from trajopt.model_cvxpy import QUADRATIC, RESCUES, ConvexModel
+    from trajopt.convex_solvers import QUADRATIC, RESCUES
+    from trajopt.model_cvxpy import ConvexModel
 
     enough = (max(enough, _STEP) if step else enough) * rounding(setting.mesh)
     best: Attempt | None = None
@@ -141,7 +142,7 @@ def rounding(mesh: Mesh) -> float:
 def rungs(setting: Setting) -> Sequence[str]:
     """The solvers and settings that a program goes to in turn: those of PIQP or Clarabel where asked for, else all; on
     a large mesh without the first, which fails there."""
-    from trajopt.model_cvxpy import LADDER, QUADRATIC
+    from trajopt.convex_solvers import LADDER, QUADRATIC
 
     own = {"piqp": QUADRATIC, "clarabel": tuple(rung for rung in LADDER if rung not in QUADRATIC)}
     found = own.get(setting.problem.transcription.solver, LADDER)

@@ -1,7 +1,6 @@
-"""Convex models: Clarabel or OSQP through CVXPY's interfaces to them, or PIQP. The only file that imports cvxpy.
+"""Convex models: a program collected as rows of one sparse matrix (`trajopt.affine`), for `trajopt.convex_solvers`.
 
-The program is collected as rows of one sparse matrix (`trajopt.affine`) and goes to CVXPY as the cone program that its
-own canonicalisation would arrive at: that took ten times as long as solving it.
+CVXPY's own canonicalisation arrives at the same program, and took ten times as long as solving it.
 """
 
 from __future__ import annotations
@@ -9,48 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from types import SimpleNamespace
 from typing import Any, Final
 
-import cvxpy
 import numpy as np
-from cvxpy.reductions.solvers.defines import SOLVER_MAP_CONIC, SOLVER_MAP_QP
-from scipy import sparse
 
-from trajopt import certificate, piqp
+from trajopt import certificate, convex_solvers
 from trajopt.affine import NONE, Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
 from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
-
-cp: Any = cvxpy  # its atoms are exported in a way that type checkers do not see
-_CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
-_PIQP_TOLERANCES: Final = ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel")
-_SETTINGS: Final[dict[str, dict[str, Any]]] = {
-    # Measured: four times as fast as Clarabel, as exact, in 10 to 25 iterations; or not at all. Longer steps with less
-    # regularisation save an eighth of them; even longer ones fail at times.
-    "piqp": dict.fromkeys(_PIQP_TOLERANCES, 1e-11) | {
-        "max_iter": 50, "kkt_solver": "sparse_ldlt_ineq_cond", "preconditioner_iter": 3, "tau": 0.997,
-        "delta_init": 1e-6,
-    },
-    # A fifth slower, and reliable up to N = 100000, where more than this cannot be asked for; there shorter steps do
-    # with fewer iterations.
-    "piqp-firm": dict.fromkeys(_PIQP_TOLERANCES, 1e-9) | {
-        "max_iter": 100, "reg_lower_limit": 1e-12, "preconditioner_iter": 3, "tau": 0.97, "delta_init": 1e-7,
-    },
-    # Measured: little regularisation is accurate, and fails from N = 20000 on; more solves those.
-    "clarabel": _CLARABEL | {"static_regularization_constant": 1e-10},
-    "clarabel-firm": _CLARABEL | {"static_regularization_constant": 1e-8},
-    "clarabel-soft": _CLARABEL | {"static_regularization_constant": 1e-7},
-    "clarabel-faer": _CLARABEL | {"static_regularization_constant": 1e-10, "direct_solve_method": "faer"},
-    "osqp-last": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 10_000, "polishing": True},
-    "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 200_000, "polishing": True},
-}
-RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, and not for cones: where none came near
-QUADRATIC: Final = ("piqp", "piqp-firm")  # the rungs for linear and quadratic programs
-LADDER: Final = (*QUADRATIC, "clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
-SOLVERS: Final[dict[str, Any]] = {
-    "CLARABEL": SOLVER_MAP_CONIC["CLARABEL"], "OSQP": SOLVER_MAP_QP["OSQP"]
-}
 
 
 class ConvexModel:
@@ -176,7 +141,7 @@ class ConvexModel:
         if program.cones and name != "clarabel":
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
         try:
-            claim, status, iterations, x, z = _ended(name, program, self.opposite, _SETTINGS[solver], seconds)
+            claim, status, iterations, x, z = convex_solvers.run(solver, program, self.opposite, seconds)
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()
@@ -233,47 +198,6 @@ class _Rows:
 
 
 _EXCESS: Final = 1e-6  # of a row, which has size one: what a move that passes the check may exceed it by
-_CLAIMS: Final = {
-    cp.OPTIMAL: Claim.OPTIMAL,
-    cp.OPTIMAL_INACCURATE: Claim.INACCURATE,
-    cp.INFEASIBLE: Claim.INFEASIBLE,
-    cp.INFEASIBLE_INACCURATE: Claim.FAILED,
-    cp.UNBOUNDED: Claim.UNBOUNDED,
-    cp.USER_LIMIT: Claim.LIMIT,
-}
-
-
-def _ended(
-    solver: str,
-    program: certificate.ConeProgram,
-    opposite: tuple[Integers, Integers],
-    settings: dict[str, Any],
-    seconds: float | None,
-) -> tuple[Claim, str, int, Floats, Floats]:
-    """How a run ended: the claim, the solver's word, its iterations, and the primal and dual vectors."""
-    if solver == "piqp":  # which knows no time limit, but takes few iterations
-        return piqp.solve(program, opposite, settings)
-    limit = {} if seconds is None else {"time_limit": seconds}
-    interface = SOLVERS[solver.upper()]
-    raw = interface.solve_via_data(_data(solver, program), False, False, settings | limit)
-    if solver == "osqp":
-        status, iterations, z = interface.STATUS_MAP.get(raw.info.status_val), raw.info.iter, raw.y
-    else:
-        status, iterations, z = interface.STATUS_MAP.get(str(raw.status)), raw.iterations, raw.z
-    x, z = (np.array(part, dtype=float) for part in (raw.x, z))  # copies: a view keeps the solver's memory
-    return _CLAIMS.get(status, Claim.FAILED), status or cp.SOLVER_ERROR, iterations, x, z
-
-
-def _data(solver: str, program: certificate.ConeProgram) -> dict[str, Any]:
-    """The program under the names that CVXPY's interfaces read."""
-    P, A, b, zero = program.P, program.A, program.b, program.zero
-    if solver == "osqp":
-        equal, below = (sparse.csc_array(rows) for rows in (A[:zero], A[zero:]))
-        return {"P": P, "q": program.q, "A": equal, "b": b[:zero], "F": below, "G": b[zero:]}
-    dims = SimpleNamespace(
-        zero=zero, nonneg=program.nonnegative, soc=list(program.cones), exp=0, psd=[], p3d=[], pnd=[]
-    )
-    return {"P": P, "c": program.q, "A": sparse.csc_array(A), "b": b, "dims": dims}
 
 
 def _opposites(parts: list[Affine]) -> tuple[Integers, Integers]:

@@ -31,7 +31,8 @@ def is_impossible(setting: Setting, duration: float, clock: Clock) -> bool:
     All limits are widened together by the least factor that makes the program feasible: when even our lower bound on
     that factor is positive, the move is impossible. (Feasibility as such is too hard a question near the edge.)
     """
-    from trajopt.model_cvxpy import LADDER, ConvexModel
+    from trajopt.convex_solvers import LADDER
+    from trajopt.model_cvxpy import ConvexModel
 
     setting = replace(setting, problem=implied(setting.problem))
     model = ConvexModel()
