@@ -7,7 +7,6 @@ from math import comb
 from typing import Final
 
 import numpy as np
-from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from trajopt import motor, vibration
@@ -103,8 +102,8 @@ def peak(signal: Signal) -> float:
     if not doubtful.size:
         return best
     power = _power_form(doubtful)
-    slope: Floats = np.asarray(polynomial.polyder(power))
-    inside = polynomial.polyval(_roots_inside(slope), power[:, None], tensor=False)
+    slope = power[1:] * np.arange(1, len(power))[:, None]
+    inside = _values(power, _roots_inside(slope))
     return float(np.max(np.abs(inside), initial=best))
 
 
@@ -126,10 +125,12 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
     total = np.abs(_integrals(trajectory, signal))
     steps = np.diff(trajectory.time)
     mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
-    power = _power_form(pieces[:, mixed])
-    ends = np.concatenate([np.zeros((1, len(mixed))), _roots_inside(power), np.ones((1, len(mixed)))])
-    risen = polynomial.polyval(ends, polynomial.polyint(power)[:, None], tensor=False)
-    total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
+    if len(mixed):
+        power = _power_form(pieces[:, mixed])
+        ends = np.concatenate([np.zeros((1, len(mixed))), _roots_inside(power), np.ones((1, len(mixed)))])
+        integral = power / np.arange(1, len(power) + 1)[:, None]
+        risen = ends * _values(integral, ends)
+        total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
     return float(np.sum(total))
 
 
@@ -165,6 +166,14 @@ def _power_form(bernstein: Floats) -> Floats:
     """(n+1, m) power coefficients, lowest first, of m polynomials from their Bernstein coefficients on [0, 1]."""
     power: Floats = _powers(len(bernstein) - 1) @ bernstein
     return power
+
+
+def _values(power: Floats, at: Floats) -> Floats:
+    """(n, m) m polynomials at n places each, (n, m)."""
+    found = np.zeros_like(at)
+    for row in power[::-1]:
+        found = found * at + row
+    return found
 
 
 def _roots_inside(power: Floats) -> Floats:

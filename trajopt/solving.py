@@ -134,7 +134,7 @@ def _coasting(setting: Setting) -> Attempt | None:
     start[0] = min(places, default=0.0)  # where a free start may stand still
     for node, i, value in states:
         start[i] = value if node == 0 else start[i]
-    if duration is None:
+    if duration is None or (not np.any(start[1:]) and len(places) > 1):  # at rest it goes nowhere
         return None
     chain = setting.scheme.rollout(start, np.zeros(setting.mesh.intervals), setting.mesh.steps * duration)
     if any(abs(chain[i][node] - value) > 1e-12 * sizes.derivative[i] for node, i, value in states):
