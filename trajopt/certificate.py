@@ -88,10 +88,11 @@ def _separates(program: ConeProgram, z: Floats, reach: Floats) -> bool:
 def _reach(program: ConeProgram, otherwise: float) -> Floats:
     """(n,) what no variable exceeds in size: by its own bounds where rows with one entry state them."""
     below, above = np.full(len(program.q), otherwise), np.full(len(program.q), otherwise)
-    rows = program.A[program.zero : program.zero + program.nonnegative]
-    single = np.flatnonzero(np.diff(rows.indptr) == 1)
-    columns, entries = rows.indices[rows.indptr[single]], rows.data[rows.indptr[single]]
-    bounds = program.b[program.zero : program.zero + program.nonnegative][single] / entries
+    A, rows = program.A, slice(program.zero, program.zero + program.nonnegative)
+    first = A.indptr[rows]
+    single = np.flatnonzero(A.indptr[rows.start + 1 : rows.stop + 1] - first == 1)
+    columns, entries = A.indices[first[single]], A.data[first[single]]
+    bounds = program.b[rows][single] / entries
     up = entries > 0
     np.minimum.at(above, columns[up], np.abs(bounds[up]))
     np.minimum.at(below, columns[~up], np.abs(bounds[~up]))
