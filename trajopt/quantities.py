@@ -51,7 +51,7 @@ class Quantities:
     scheme: Scheme
     mesh: Mesh
     sizes: Sizes
-    chain: list[Any]  # (N+1,) each below the order, (N,) at the order; position as displacement from the start
+    chain: list[Any]  # (N+1,) each below the order, (N,) at the order; position as displacement, or at waypoints only
     steps: Any  # (N,) s
 
     def signal(self, name: str) -> Signal:

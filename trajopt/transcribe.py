@@ -95,9 +95,9 @@ class Transcript:
 
 
 @dataclass(frozen=True)
-class Told:
-    """Position at the ends and where it is prescribed: at other nodes it is no variable, since nothing is said of it
-    there. That saves a convex program a seventh of its time."""
+class Waypoints:
+    """Position at the ends and where it is prescribed, (k,) ``values`` at ``nodes``: at the others it is no variable,
+    since nothing is said of it there. That saves a convex program a seventh of its time."""
 
     nodes: tuple[int, ...]
     values: Any
@@ -157,7 +157,7 @@ def lay(
     chain = _variables(problem, mesh, sizes, model, duration, widen)
     for i in range(problem.order):
         change = scheme.change(model, chain, i, steps)
-        if isinstance(chain[i], Told):
+        if isinstance(chain[i], Waypoints):
             chain[i].follow(model, change, sizes.derivative[i])
         else:
             model.zero(chain[i][1:] - (chain[i][:-1] + change), sizes.derivative[i])
@@ -190,14 +190,14 @@ def _variables(
     """The chain: (N+1,) node values of each derivative below the order, (N,) interval values at the order.
 
     Node limits are bounds of the variables, except where a boundary state is prescribed (there an equality says it)
-    and where they are to be widened. Position is told at its nodes alone where that is enough.
+    and where they are to be widened. Position is held at waypoints alone where that is enough.
     """
     chain: list[Any] = []
     for i in range(problem.order + 1):
         if i == 0 and model.convex and not _needs_path(problem):
             nodes = sorted({0, mesh.intervals, *(node for node, j, _ in prescribed(problem, mesh) if j == 0)})
             infinite = np.full(len(nodes), np.inf)
-            chain.append(Told(tuple(nodes), model.vector(len(nodes), sizes.derivative[0], -infinite, infinite)))
+            chain.append(Waypoints(tuple(nodes), model.vector(len(nodes), sizes.derivative[0], -infinite, infinite)))
             continue
         name = DERIVATIVES[i]
         lower, upper = node_limits(problem, i, mesh, duration)
