@@ -63,6 +63,7 @@ class Outcome:
     forgiven: float = 0.0  # what the check lets pass in the rows, times multipliers: a bound may lie so far above
     prices: dict[str, Prices] = field(default_factory=dict)
     pair: Pair | None = None
+    lagrangian: float = np.nan  # of the program at the pair; NaN where it is not known
     solver: str = ""  # of a convex program: the one of several that this is the end of
     proof: float = 0.0  # s, of ``seconds``, that our own bound took
 

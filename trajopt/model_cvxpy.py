@@ -159,17 +159,24 @@ class ConvexModel:
         ended = perf_counter()
         with np.errstate(over="ignore"):  # of a run that came to nothing
             forgiven = _EXCESS * float(np.abs(z).sum())
+        pair, lagrangian = self._pair(x, z, value)
         return Outcome(
             claim, status, value, iterations, ended - started, bound, forgiven,
-            self._prices(z[program.zero :]), self._pair(x, z), name, ended - solved,
+            self._prices(z[program.zero :]), pair, lagrangian, name, ended - solved,
         )  # fmt: skip
 
-    def _pair(self, x: Floats, z: Floats) -> Pair:
-        """The vectors of `trajopt.model.Pair`, from those of the program."""
+    def _pair(self, x: Floats, z: Floats, value: float) -> tuple[Pair, float]:
+        """The vectors of `trajopt.model.Pair`, from those of the program, and the Lagrangian at them; NaN without a value, or where
+        variables of our own stand for squares, which they equal to a tolerance only."""
         first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
         variables, rows = self._asked
-        dual = [z[first[kind] :][place] for kind, place in rows]
-        return Pair(np.concatenate([x[place] for place in variables]), np.concatenate([np.empty(0), *dual]))
+        places = [slice(first[kind] + place.start, first[kind] + place.stop) for kind, place in rows]
+        primal, dual = (np.concatenate([np.empty(0), *(of[k] for k in at)]) for of, at in ((x, variables), (z, places)))
+        pair = Pair(primal, dual)
+        if np.isnan(value) or len(primal) < self._count:
+            return pair, np.nan
+        missed = self.program.A @ x - self.program.b
+        return pair, value + sum(float(z[k] @ missed[k]) for k in places)
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:
         """The prices of named rows, from the multipliers of inequalities."""

@@ -19,8 +19,11 @@ from trajopt.transcribe import Setting
 _STEP: Final = 1e-6  # of the duration, for the difference of the Lagrangian, which is smooth
 
 
-def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float) -> list[dict[str, Any]]:
-    """The prices of the limits and of the time, the most effective first; those of no effect last, at zero.
+def prices(
+    setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float, own: bool = False
+) -> list[dict[str, Any]]:
+    """The prices of the limits and of the time, the most effective first; those of no effect last, at zero. ``own``:
+    the attempt has solved just this setting's program, not one that was linearised elsewhere.
 
     Each: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI objective
     per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened by 1 %;
@@ -29,7 +32,7 @@ def prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float, valu
     found = _limits(setting.problem, attempt)
     if (
         setting.problem.move.fixed_time is not None
-        and (per_second := _time(setting, attempt, goal, duration)) is not None
+        and (per_second := _time(setting, attempt, goal, duration, own)) is not None
     ):
         found["time"] = (per_second, per_second * duration)
     return ranked(setting.problem, found, value)
@@ -59,14 +62,17 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
     return found
 
 
-def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> float | None:
+def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float, own: bool = False) -> float | None:
     """The objective per second of duration; None where the mesh itself hangs on times in seconds."""
     problem = setting.problem
     if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.pair is None:
         return None
     if any(limit.varies for limit in problem.limits.given.values()):
         return None
-    now, later = (lagrangian(setting, duration * (1 + s), goal, attempt) for s in (0.0, _STEP))
+    later = lagrangian(setting, duration * (1 + _STEP), goal, attempt)
+    now = attempt.outcome.lagrangian if own else np.nan
+    if np.isnan(now):
+        now = lagrangian(setting, duration, goal, attempt)
     return attempt.slope * (later - now) / (_STEP * duration)
 
 

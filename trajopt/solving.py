@@ -160,7 +160,7 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     duration = setting.problem.move.fixed_time
     assert duration is not None
     solver = "osqp" if chosen.solver == "osqp" else "auto"
-    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock)
+    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock, own=True)
     return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
 
 
@@ -329,12 +329,12 @@ def _first_duration(setting: Setting) -> float:
     return (1.2 if is_time_search(setting.problem) else 1.5) * setting.sizes.duration
 
 
-def _priced(setting: Setting, attempt: Attempt, clock: Clock) -> Attempt:
-    """The attempt with the prices of the limits of its problem."""
+def _priced(setting: Setting, attempt: Attempt, clock: Clock, own: bool = False) -> Attempt:
+    """The attempt with the prices of the limits of its problem; ``own`` as for `trajopt.prices.prices`."""
     if attempt.trajectory is None:
         return attempt
     since = perf_counter()
     goal = to(setting.problem.objective)
-    found = prices(setting, attempt, goal, attempt.trajectory.duration, attempt.value)
+    found = prices(setting, attempt, goal, attempt.trajectory.duration, attempt.value, own)
     clock.charge("prices", since)
     return replace(attempt, notes=attempt.notes | {"prices": found})
