@@ -166,8 +166,8 @@ class ConvexModel:
         )  # fmt: skip
 
     def _pair(self, x: Floats, z: Floats, value: float) -> tuple[Pair, float]:
-        """The vectors of `trajopt.model.Pair`, from those of the program, and the Lagrangian at them; NaN without a value, or where
-        variables of our own stand for squares, which they equal to a tolerance only."""
+        """The vectors of `trajopt.model.Pair`, from those of the program, and the Lagrangian at them; NaN without a
+        value, or where variables of our own stand for squares, which they equal to a tolerance only."""
         first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
         variables, rows = self._asked
         places = [slice(first[kind] + place.start, first[kind] + place.stop) for kind, place in rows]
