@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from trajopt.errors import NoSolution
+from trajopt.fields import digest
 from trajopt.files import write_atomically
 from trajopt.routing import Route
 from trajopt.verdict import Verdict
@@ -68,6 +69,7 @@ class Answer:
         """The result file's content: plain JSON data, numbers null where there is no solution."""
         from trajopt import __version__
 
+        canonical = self.problem.canonical()
         return {
             "format": self.FORMAT,
             "trajopt": __version__,
@@ -83,8 +85,8 @@ class Answer:
             "structure": None,
             "route": self.route.to_dict(),
             "timings": dict(self.timings),
-            "problem_hash": self.problem.hash,
-            "problem": self.problem.canonical(),
+            "problem_hash": digest(canonical),
+            "problem": canonical,
             "trajectory": None,
         }
 

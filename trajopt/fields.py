@@ -44,6 +44,12 @@ class Section(BaseModel):
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
 
+def digest(canonical: Mapping[str, Any]) -> str:
+    """The hash of a problem, from its canonical form."""
+    text = json.dumps(canonical, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 class Whole(Section):
     """A problem: sections that can be replaced, and the data and hash that it is known by."""
 
@@ -54,8 +60,7 @@ class Whole(Section):
     @property
     def hash(self) -> str:
         """SHA-256 of the canonical form: two problems with the same one are the same problem."""
-        text = json.dumps(self.canonical(), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+        return digest(self.canonical())
 
     def canonical(self) -> dict[str, Any]:
         """Plain SI data that says everything about the problem, for result files and hashes."""

@@ -168,8 +168,9 @@ def values_at(rows: Array, index: Integers, s: Array) -> Array:
 
 def mean_square(rows: Array) -> Array:
     """The mean of p squared over each piece, from its coefficients."""
-    square = product(rows, rows)
-    return square @ (1.0 / np.arange(1, square.shape[1] + 1))
+    powers = np.arange(rows.shape[1])
+    found: Array = np.sum(rows @ (1.0 / (np.add.outer(powers, powers) + 1)) * rows, axis=1)
+    return found
 
 
 # in whole numbers
