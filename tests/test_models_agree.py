@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import piqp
 import pytest
 
 import trajopt
@@ -141,21 +142,31 @@ def test_multipliers_of_rows_with_two_sides_are_those_of_two_rows(limits: dict[s
     assert piqp == pytest.approx(clarabel, rel=1e-5, abs=1e-7) and any(piqp.values())
 
 
-def test_piqp_gets_one_row_for_both_sides_of_a_limit() -> None:
+def test_piqp_gets_one_row_for_both_sides_of_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """And no row, and no variable, for position between the ends."""
+    seen: list[int] = []
+
+    class Watched(piqp.SparseSolver):
+        def setup(self, **data: Any) -> None:
+            seen.append(data["G"].shape[0])
+            super().setup(**data)
+
+    monkeypatch.setattr(piqp, "SparseSolver", Watched)
     model, count = ConvexModel(), 30
     free = axis("jerk", "l2", limits=LIMITS, intervals=count)
     transcribe(Setting.of(free), model, 1.0)
-    program, (first, second) = model.program, model.opposite
+    program = model.program
+    first, second = program.opposite
     inequalities = program.A[program.zero :]
     assert abs(inequalities[first] + inequalities[second]).max() == 0.0
-    assert len(second) == len(inequalities.toarray()) / 2
+    assert len(second) == inequalities.shape[0] / 2
     assert program.A.shape[1] == 2 + 2 * (count + 1) + count
     limited = axis("jerk", "l2", limits={**LIMITS, "position": (-9.0, 9.0)}, intervals=count)
     transcribe(Setting.of(limited), whole := ConvexModel(), 1.0)
     assert whole.program.A.shape[1] == program.A.shape[1] + count - 1
     found = [solved(problem).objective for problem in (limited, free)]
     assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert seen[-1] == len(second)
 
 
 def test_a_large_mesh_is_solved_by_the_firm_setting() -> None:

@@ -12,11 +12,10 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
+from trajopt.model import Floats, Integers
+
 _CONCAVE: Final = "the square is bounded above, or its negative minimised: no convex program"
 NONE: Final = np.empty(0, dtype=np.intp)
 

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-Floats = NDArray[np.float64]
+from trajopt.affine import NONE
+from trajopt.model import Floats, Integers
+
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
 _PAID: Final = 1e-12  # of the value: what inexact stationarity may take off a bound without being mended
 _WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-16, 1e-17)))  # of `_restored`
@@ -28,7 +29,8 @@ _WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-1
 @dataclass(frozen=True)
 class ConeProgram:
     """min ½x'Px + q'x with Ax + s = b; s is zero on the first ``zero`` rows, nonnegative on the next ``nonnegative``,
-    and in second-order cones of the sizes ``cones`` on the rest."""
+    and in second-order cones of the sizes ``cones`` on the rest. ``opposite``: (n,) nonnegative rows, counted from the
+    first of them, and (n,) those with the same coefficients but for the sign, the other sides of the same limits."""
 
     P: sparse.csc_array
     q: Floats
@@ -37,6 +39,7 @@ class ConeProgram:
     zero: int
     nonnegative: int
     cones: tuple[int, ...] = ()
+    opposite: tuple[Integers, Integers] = (NONE, NONE)
 
     def value(self, x: Floats) -> float:
         """The objective at x."""

@@ -49,27 +49,24 @@ _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do 
 }
 
 
-def run(solver: str, program: ConeProgram, opposite: tuple[Integers, Integers], seconds: float | None) -> Ended:
+def run(solver: str, program: ConeProgram, seconds: float | None) -> Ended:
     """How a run by a rung of LADDER or ``osqp`` ended: the claim, the solver's word, its iterations, and the primal and
-    dual vectors.
-
-    ``opposite``: (n,) rows of inequalities, and (n,) those with the same coefficients but for the sign. Raises
-    ImportError where the solver is not installed.
+    dual vectors. Raises ImportError where the solver is not installed.
     """
     settings = _SETTINGS[solver]
     if solver in QUADRATIC:  # PIQP knows no time limit, but takes few iterations
-        return _by_piqp(program, opposite, settings)
+        return _by_piqp(program, settings)
     limit = {} if seconds is None else {"time_limit": seconds}
     return _by_cvxpy(solver.partition("-")[0], program, settings | limit)
 
 
-def _by_piqp(program: ConeProgram, opposite: tuple[Integers, Integers], settings: dict[str, Any]) -> Ended:
+def _by_piqp(program: ConeProgram, settings: dict[str, Any]) -> Ended:
     """By PIQP's own interface: CVXPY's hands on no rows with two sides, which save it a fifth of its time."""
     piqp: Any = import_module("piqp")
     solver = piqp.SparseSolver()
     for name, value in settings.items():
         setattr(solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
-    zero, (first, second) = program.zero, opposite
+    zero, (first, second) = program.zero, program.opposite
     upper = program.b[zero:]
     lower, kept = np.full(len(upper), -_INFINITE), np.ones(len(upper), dtype=bool)
     lower[first], kept[second] = -upper[second], False

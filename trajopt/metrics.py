@@ -7,7 +7,7 @@ from math import comb
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial import polynomial
 
 from trajopt import motor, vibration
 from trajopt.mesh import Floats
@@ -102,8 +102,8 @@ def peak(signal: Signal) -> float:
     if not doubtful.size:
         return best
     power = _power_form(doubtful)
-    slope = power[1:] * np.arange(1, len(power))[:, None]
-    inside = _values(power, _roots_inside(slope))
+    slope: Floats = np.asarray(polynomial.polyder(power))
+    inside = polynomial.polyval(_roots_inside(slope), power[:, None], tensor=False)
     return float(np.max(np.abs(inside), initial=best))
 
 
@@ -128,8 +128,7 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
     if len(mixed):
         power = _power_form(pieces[:, mixed])
         ends = np.concatenate([np.zeros((1, len(mixed))), _roots_inside(power), np.ones((1, len(mixed)))])
-        integral = power / np.arange(1, len(power) + 1)[:, None]
-        risen = ends * _values(integral, ends)
+        risen = polynomial.polyval(ends, polynomial.polyint(power)[:, None], tensor=False)
         total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
     return float(np.sum(total))
 
@@ -168,39 +167,18 @@ def _power_form(bernstein: Floats) -> Floats:
     return power
 
 
-def _values(power: Floats, at: Floats) -> Floats:
-    """(n, m) m polynomials at n places each, (n, m)."""
-    found = np.zeros_like(at)
-    for row in power[::-1]:
-        found = found * at + row
-    return found
-
-
 def _roots_inside(power: Floats) -> Floats:
-    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted; 1 where there are fewer."""
+    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted, as eigenvalues of their companions; 1 where
+    there are fewer."""
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
     for n in np.unique(degree[degree > 0]):
         columns = np.flatnonzero(degree == n)
-        roots = _roots(power[:n, columns] / power[n, columns])
+        companion = np.zeros((len(columns), n, n))
+        companion[:, 1:, :-1] = np.eye(n - 1)
+        companion[:, :, -1] = -(power[:n, columns] / power[n, columns]).T
+        roots = np.linalg.eigvals(companion)
         inside = (np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)
         found[:n, columns] = np.sort(np.where(inside, roots.real, 1.0), axis=1).T
     return found
-
-
-def _roots(monic: Floats) -> NDArray[np.complex128]:
-    """(m, n) the roots of m polynomials of degree n, from their (n, m) lower coefficients; above a quadratic as
-    eigenvalues of their companions."""
-    n, m = monic.shape
-    if n == 1:
-        return -monic.T.astype(complex)
-    if n == 2:
-        half = monic[1] / -2
-        root = np.sqrt((half**2 - monic[0]).astype(complex))
-        larger = half + np.where(half < 0, -root, root)
-        return np.stack([larger, monic[0] / np.where(larger == 0, 1.0, larger)], axis=1)
-    companion = np.zeros((m, n, n))
-    companion[:, 1:, :-1] = np.eye(n - 1)
-    companion[:, :, -1] = -monic.T
-    return np.asarray(np.linalg.eigvals(companion), dtype=complex)

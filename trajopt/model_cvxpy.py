@@ -31,7 +31,6 @@ class ConvexModel:
         self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
-        self.opposite = NONE, NONE  # rows below zero, and those with the same coefficients but for the sign
         self._answer: Floats | None = None
 
     def copied(self) -> ConvexModel:
@@ -124,14 +123,14 @@ class ConvexModel:
     @cached_property
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
-        self.opposite = _opposites(self._rows["below"].parts)
+        opposite = _opposites(self._rows["below"].parts)
         equal, below, inside = self._rows.values()
         rows = stacked([*equal.parts, *below.parts, *(part * -1.0 for part in inside.parts)])
         P, q, self._constant = self._objective.quadratic(self._count)
         A = rows.matrix(self._count)
         for kind in self._rows.values():
             kind.parts = []  # the memory of large meshes
-        return certificate.ConeProgram(P, q, A, -rows.constant, equal.count, below.count, tuple(self._sizes))
+        return certificate.ConeProgram(P, q, A, -rows.constant, equal.count, below.count, tuple(self._sizes), opposite)
 
     def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
@@ -141,7 +140,7 @@ class ConvexModel:
         if program.cones and name != "clarabel":
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
         try:
-            claim, status, iterations, x, z = convex_solvers.run(solver, program, self.opposite, seconds)
+            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds)
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()

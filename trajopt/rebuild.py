@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from trajopt.mesh import Floats, Mesh
@@ -11,7 +13,7 @@ from trajopt.schemes import Scheme
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import node_limits, prescribed
 
-_ROUNDING = 1e-15  # of a condition, over its size: no correction comes closer
+_ROUNDING: Final = 1e-15  # of a condition, over its size: no correction comes closer
 
 
 def rebuild(

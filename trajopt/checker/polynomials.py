@@ -109,6 +109,8 @@ def absolute_integral(rows: Array, length: Array) -> float:
     """The integral of |p| over all pieces, split where p changes its sign until its chord does for it."""
     total, slack = 0.0, 1e-13 * np.abs(rows).max()
     enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
+    if not math.isfinite(enough):  # no splitting would end it
+        return math.nan
     share = np.linspace(0.0, 1.0, rows.shape[1])
     for _ in range(_ROUNDS):
         whole = (_greatest(-rows) <= slack) | (_greatest(rows) <= slack)
