@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -167,6 +168,13 @@ def test_piqp_gets_one_row_for_both_sides_of_a_limit(monkeypatch: pytest.MonkeyP
     found = [solved(problem).objective for problem in (limited, free)]
     assert found[0] == pytest.approx(found[1], rel=1e-9)
     assert seen[-1] == len(second)
+
+
+@pytest.mark.parametrize("solver", ["piqp", "clarabel"])
+def test_a_solver_that_is_missing_is_named(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, solver, None)
+    with pytest.raises(trajopt.MissingSolver, match=f"^{solver} is not installed; 'pip install {solver}'"):
+        trajopt.solve(axis("jerk", "l2", intervals=20, solver=solver))
 
 
 def test_a_large_mesh_is_solved_by_the_firm_setting() -> None:
