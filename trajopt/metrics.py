@@ -41,7 +41,7 @@ def metrics(trajectory: Trajectory) -> dict[str, float]:
         found[f"rms_{name}"] = rms(trajectory, signal)
     found["distance"] = absolute_integral(trajectory, trajectory.signal("velocity"), plain=True)
     if "power" in names:
-        found["energy"] = absolute_integral(trajectory, trajectory.signal("power"))
+        found["energy"] = absolute_integral(trajectory, *(trajectory.signal(x) for x in ("power", "force", "velocity")))
     if "current" in names:
         found |= _electrical(trajectory, found["rms_current"])
     for k, mode in enumerate(trajectory.problem.vibration, start=1):
@@ -116,8 +116,9 @@ def rms(trajectory: Trajectory, signal: Signal) -> float:
     return float(np.sqrt(np.diff(trajectory.time) @ squares / trajectory.duration))
 
 
-def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = False) -> float:
-    """∫|x|dt; for the Euler scheme the trapezoidal rule, or (plain) the rectangles it integrates with."""
+def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, plain: bool = False) -> float:
+    """∫|x|dt; for the Euler scheme the trapezoidal rule, or (plain) the rectangles it integrates with. ``factors``: what
+    the signal is the product of, if anything: they change sign where it does, and have a lower degree."""
     if not signal.pieces:
         x = np.abs(signal.nodes)
         return float(np.diff(trajectory.time) @ x[:-1] if plain else np.trapezoid(x, trajectory.time))
@@ -127,7 +128,8 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, plain: bool = Fals
     mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
     if len(mixed):
         power = _power_form(pieces[:, mixed])
-        ends = np.concatenate([np.zeros((1, len(mixed))), _roots_inside(power), np.ones((1, len(mixed)))])
+        roots = np.concatenate([_roots_inside(_power_form(x.rows[:, mixed])) for x in factors or (signal,)])
+        ends = np.concatenate([np.zeros((1, len(mixed))), np.sort(roots, axis=0), np.ones((1, len(mixed)))])
         risen = polynomial.polyval(ends, polynomial.polyint(power)[:, None], tensor=False)
         total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
     return float(np.sum(total))
@@ -168,17 +170,31 @@ def _power_form(bernstein: Floats) -> Floats:
 
 
 def _roots_inside(power: Floats) -> Floats:
-    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted, as eigenvalues of their companions; 1 where
-    there are fewer."""
+    """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted; 1 where there are fewer. By the quadratic
+    formula, of higher degrees as eigenvalues of their companions."""
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
     for n in np.unique(degree[degree > 0]):
         columns = np.flatnonzero(degree == n)
-        companion = np.zeros((len(columns), n, n))
-        companion[:, 1:, :-1] = np.eye(n - 1)
-        companion[:, :, -1] = -(power[:n, columns] / power[n, columns]).T
-        roots = np.linalg.eigvals(companion)
-        inside = (np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)
-        found[:n, columns] = np.sort(np.where(inside, roots.real, 1.0), axis=1).T
+        of = power[: n + 1, columns]
+        if n <= 2:
+            roots = _quadratic_roots(of)
+        else:
+            companion = np.zeros((len(columns), n, n))
+            companion[:, 1:, :-1] = np.eye(n - 1)
+            companion[:, :, -1] = -(of[:-1] / of[-1]).T
+            complex_roots = np.linalg.eigvals(companion)
+            roots = np.where(np.abs(complex_roots.imag) < 1e-9, complex_roots.real, 1.0).T
+        found[:n, columns] = np.sort(np.where((roots > 0) & (roots < 1), roots, 1.0), axis=0)
     return found
+
+
+def _quadratic_roots(power: Floats) -> Floats:
+    """(n, m) the roots of polynomials (n+1, m) of degree n, one or two, without cancellation; NaN for complex ones."""
+    if len(power) == 2:
+        return np.asarray(-power[:1] / power[1])
+    c, b, a = power
+    with np.errstate(invalid="ignore", divide="ignore"):
+        larger = -(b + np.copysign(np.sqrt(b * b - 4 * a * c), b)) / 2
+        return np.stack([larger / a, c / larger])
