@@ -14,10 +14,11 @@ import trajopt
 from problems import slider_crank
 from tests.conftest import solved, term
 from trajopt import checker, preflight
-from trajopt.attempt import Clock, nonconvex, to
+from trajopt.attempt import Clock, NonconvexProgram, nonconvex, to, unlimited
 from trajopt.checker.splines import Spline
 from trajopt.metrics import metrics
 from trajopt.rebuild import rebuild
+from trajopt.several_starts import best_of_starts, from_several_starts, starts
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
 
@@ -119,6 +120,29 @@ def test_forty_random_starts_reach_the_same_optimum() -> None:
         assert attempt.trajectory is not None, attempt.outcome.raw_status
         values.append(attempt.value)
     assert max(values) / min(values) - 1 < 1e-6
+
+
+def test_a_run_depends_on_its_start_alone() -> None:
+    problem = crank(intervals=30)
+    setting = Setting.of(problem)
+    program = NonconvexProgram(setting, to(problem.objective), Clock())
+    smooth, peaked = (start.trajectory for start in [*starts(setting, Clock())][:2])
+    assert smooth is not None and peaked is not None
+    fresh = program.run(smooth)
+    program.run(unlimited(setting, slider_crank.DURATION))  # far off: it scales its objective differently
+    program.run(peaked)
+    again = program.run(smooth)
+    assert (again.outcome.iterations, again.value) == (fresh.outcome.iterations, fresh.value)
+
+
+def test_starts_are_tried_on_a_coarse_mesh_and_lead_to_the_same_optimum() -> None:
+    problem = crank(intervals=120)
+    setting = Setting.of(problem)
+    found = from_several_starts(setting, Clock())
+    assert found.trajectory is not None and found.trajectory.mesh.intervals == 120
+    assert found.notes["starts"] == found.notes["agreed"] == 3
+    best = best_of_starts(setting, Clock())
+    assert found.value == pytest.approx(best.value, rel=1e-9)
 
 
 def test_ipopt_has_exact_derivatives_of_the_curves() -> None:

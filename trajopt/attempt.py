@@ -11,7 +11,7 @@ import numpy as np
 
 import norms
 from trajopt.lagrangian import Lagrangian
-from trajopt.mesh import LARGE, Mesh
+from trajopt.mesh import LARGE, Floats, Mesh
 from trajopt.model import Claim, Outcome
 from trajopt.objective import Lowered, lower
 from trajopt.problem import DERIVATIVES, Objective, Problem, Term
@@ -150,28 +150,51 @@ def rungs(setting: Setting) -> Sequence[str]:
 
 
 def nonconvex(setting: Setting, goal: Goal, clock: Clock, start: Trajectory, widen: Sequence[str] = ()) -> Attempt:
-    """A local optimum by Ipopt, from a starting trajectory; the duration is free where the problem leaves it free.
+    """A local optimum by Ipopt, from one start; see `NonconvexProgram`."""
+    return NonconvexProgram(setting, goal, clock, widen).run(start)
 
-    ``widen`` as for `convex`.
-    """
-    from trajopt.model_pyomo import NonconvexModel
 
-    since = perf_counter()
-    model = NonconvexModel()
-    duration: Any = setting.problem.move.fixed_time
-    if duration is None:
-        duration = free_duration(setting, model, start.duration)[0]
-    by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
-    transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
-    for x, values in zip(transcript.chain, start.chain, strict=True):
-        model.start(x, values)
-    lowered = goal(transcript)
-    model.minimize(lowered.expression)
-    clock.charge("model", since)
-    since = perf_counter()
-    outcome = model.run("ipopt", clock.left())
-    clock.charge("solve", since)
-    return _read(setting, transcript, lowered, outcome)
+class NonconvexProgram:
+    """The nonconvex program of a setting, built once, for any number of starts; the duration is free where the problem
+    leaves it free. ``widen`` as for `convex`."""
+
+    def __init__(self, setting: Setting, goal: Goal, clock: Clock, widen: Sequence[str] = ()) -> None:
+        from trajopt.model_pyomo import NonconvexModel
+
+        since = perf_counter()
+        self._setting, self._clock, self._model = setting, clock, NonconvexModel()
+        model, duration, self._free = self._model, setting.problem.move.fixed_time, None
+        if duration is None:
+            self._free = free_duration(setting, model, setting.sizes.duration)
+        by = model.vector(1, 1.0, np.zeros(1), np.full(1, np.inf), name="widening")[0] if widen else None
+        widened = dict.fromkeys(widen, by)
+        self._transcript = transcribe(setting, model, duration if self._free is None else self._free[0], widened)
+        self._lowered = goal(self._transcript)
+        model.minimize(self._lowered.expression)
+        clock.charge("model", since)
+
+    def run(self, start: Trajectory, rung: str = "ipopt") -> Attempt:
+        """A local optimum by Ipopt, from a starting trajectory, on whatever mesh that is; ``rung``: one of
+        `trajopt.model_pyomo.RUNGS`."""
+        since, model = perf_counter(), self._model
+        model.afresh()
+        if self._free is not None:
+            model.start(self._free, np.array([start.duration]))
+        for x, values in zip(self._transcript.chain, _at_nodes(start, self._setting.mesh), strict=True):
+            model.start(x, values)
+        outcome = model.run(rung, self._clock.left())
+        self._clock.charge("solve", since)
+        return _read(self._setting, self._transcript, self._lowered, outcome)
+
+
+def _at_nodes(start: Trajectory, mesh: Mesh) -> Sequence[Floats]:
+    """The chain of a trajectory on another mesh: what it passes at the nodes, and from one to the next."""
+    if start.mesh is mesh:
+        return start.chain
+    times = mesh.fractions * start.duration
+    found = list(start.at(np.minimum(times, start.duration)).values())[: start.order]
+    found[0] = found[0] - start.origin
+    return [*found, np.diff(found[-1]) / np.diff(times)]
 
 
 def free_duration(setting: Setting, model: Any, start: float) -> Any:

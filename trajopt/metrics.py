@@ -117,8 +117,8 @@ def rms(trajectory: Trajectory, signal: Signal) -> float:
 
 
 def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, plain: bool = False) -> float:
-    """∫|x|dt; for the Euler scheme the trapezoidal rule, or (plain) the rectangles it integrates with. ``factors``: what
-    the signal is the product of, if anything: they change sign where it does, and have a lower degree."""
+    """∫|x|dt; for the Euler scheme the trapezoidal rule, or (plain) the rectangles it integrates with. ``factors``:
+    what the signal is the product of, if anything: they change sign where it does, and have a lower degree."""
     if not signal.pieces:
         x = np.abs(signal.nodes)
         return float(np.diff(trajectory.time) @ x[:-1] if plain else np.trapezoid(x, trajectory.time))

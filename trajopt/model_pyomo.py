@@ -239,6 +239,7 @@ class NonconvexModel(Smoothed):
             if self._nlp is None:
                 curves = self._curves
                 self._nlp = curved(PyomoNLP)(self._model, curves) if curves else PyomoNLP(self._model)
+            self._nlp.set_obj_factor(1.0)  # as CyIpoptNLP takes it to be: else Hessians are those of the run before
             deadline = _Deadline(seconds)
             return self._nlp, CyIpoptNLP(self._nlp, intermediate_callback=deadline), deadline
         except (ImportError, RuntimeError) as error:

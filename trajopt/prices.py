@@ -7,35 +7,41 @@ duration, at the same primal and dual vector (the envelope theorem).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
 
 from trajopt import units
-from trajopt.attempt import Attempt, Goal, lagrangian
+from trajopt.attempt import Attempt, Clock, Goal, lagrangian, to
 from trajopt.problem import Problem
 from trajopt.transcribe import Setting
 
 _STEP: Final = 1e-6  # of the duration, for the difference of the Lagrangian, which is smooth
 
 
-def prices(
-    setting: Setting, attempt: Attempt, goal: Goal, duration: float, value: float, own: bool = False
-) -> list[dict[str, Any]]:
-    """The prices of the limits and of the time, the most effective first; those of no effect last, at zero. ``own``:
-    the attempt has solved just this setting's program, not one that was linearised elsewhere.
+def priced(setting: Setting, attempt: Attempt, clock: Clock, own: bool = False) -> Attempt:
+    """The attempt with a note of the prices of the limits and of the time, the most effective first; those of no effect
+    last, at zero. ``own``: it has solved just this setting's program, not one that was linearised elsewhere.
 
-    Each: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI objective
-    per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened by 1 %;
-    None for a limit that is zero).
+    Each price: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI
+    objective per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened
+    by 1 %; None for a limit that is zero).
     """
-    found = _limits(setting.problem, attempt)
+    problem, trajectory = setting.problem, attempt.trajectory
+    if trajectory is None:
+        return attempt
+    since, duration = perf_counter(), trajectory.duration
+    found, goal = _limits(problem, attempt), to(problem.objective)
     if (
-        setting.problem.move.fixed_time is not None
+        problem.move.fixed_time is not None
         and (per_second := _time(setting, attempt, goal, duration, own)) is not None
     ):
         found["time"] = (per_second, per_second * duration)
-    return ranked(setting.problem, found, value)
+    rows = ranked(problem, found, attempt.value)
+    clock.charge("prices", since)
+    return replace(attempt, notes=attempt.notes | {"prices": rows})
 
 
 def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> list[dict[str, Any]]:
@@ -77,7 +83,7 @@ def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float, own: 
 
 
 def ranked(problem: Problem, found: dict[str, tuple[float, float]], value: float) -> list[dict[str, Any]]:
-    """Rows as `prices` returns them, from name -> (objective per SI unit of the limit, per unit of its own value)."""
+    """Rows as `priced` notes them, from name -> (objective per SI unit of the limit, per unit of its own value)."""
     rows: list[dict[str, Any]] = []
     for name in dict.fromkeys([*found, *_names(problem)]):
         unit, own = found.get(name, (0.0, 0.0))

@@ -8,17 +8,17 @@ from time import perf_counter
 
 import numpy as np
 
-import norms
-from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, rungs, smoothest, to, unlimited
+from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, rungs, smoothest, to
 from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import MassOptimum, findings, mass_optimum
 from trajopt.explain import explain_power, tested
 from trajopt.model import Claim, Outcome
 from trajopt.power import linearised, optimum, relax
-from trajopt.prices import prices
-from trajopt.problem import Objective, Problem, Term
+from trajopt.prices import priced
+from trajopt.problem import Problem
 from trajopt.quantities import is_affine
-from trajopt.routing import ALONE, Route, has_power_bound, is_time_search, nonaffine_limits, route, route_on_mesh
+from trajopt.routing import ALONE, Route, has_power_bound, nonaffine_limits, route, route_on_mesh
+from trajopt.several_starts import from_several_starts
 from trajopt.solution import Solution
 from trajopt.switching import Impossible, Unresolved
 from trajopt.switching_times import as_chain, fastest, floor, forwards
@@ -70,7 +70,7 @@ def _works(problem: Problem, clock: Clock) -> bool:
     if not nonaffine or clock.over:
         return not nonaffine
     setting = Setting.of(problem)
-    answer = _from_several_starts(setting, without(setting, nonaffine), clock)
+    answer = from_several_starts(setting, clock)
     return answer.trajectory is not None and conclude(setting, route(problem), answer, clock, local=True).status.solved
 
 
@@ -160,7 +160,7 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     duration = setting.problem.move.fixed_time
     assert duration is not None
     solver = "osqp" if chosen.solver == "osqp" else "auto"
-    attempt = _priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock, own=True)
+    attempt = priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock, own=True)
     return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
 
 
@@ -177,7 +177,7 @@ def _convex_candidates(lean: Setting, first: Attempt, chosen: Route, clock: Cloc
     for rung in rungs(lean)[1:] if first.gap <= ENOUGH else ():
         other = convex(lean, first.trajectory.duration, to(lean.problem.objective), clock, rung)
         if other.trajectory is not None:
-            yield _priced(lean, other, clock), chosen
+            yield priced(lean, other, clock), chosen
 
 
 def _shortest(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tuple[Solution, Attempt]:
@@ -221,14 +221,14 @@ def _by_descent(
     candidates = []
     if answer.trajectory is None:
         chosen = Route("pyomo", "ipopt", f"{answer.outcome.raw_status}; Ipopt from the relaxation's answer")
-        answer = _priced(lean, nonconvex(lean, to(setting.problem.objective), clock, relaxed.trajectory), clock)
+        answer = priced(lean, nonconvex(lean, to(setting.problem.objective), clock, relaxed.trajectory), clock)
         answer = replace(answer, bound=relaxed.bound)
     else:
         at_answer = linearised(lean, answer.trajectory)
         notes = answer.notes | {"starts": 1, "agreed": 1}
         if setting.problem.transcription.tighten:
             relaxed = tighten(lean, relaxed, answer.value, clock)
-        answer = replace(_priced(at_answer, replace(answer, notes=notes), clock), bound=relaxed.bound)
+        answer = replace(priced(at_answer, replace(answer, notes=notes), clock), bound=relaxed.bound)
         candidates.append(break_tie(at_answer, answer, chosen, clock))
     return first_solved(setting, [*candidates, (answer, chosen)], clock, local=True), answer
 
@@ -237,7 +237,7 @@ def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: C
     """Where the answer without the nonconvex limits breaks them: a local optimum with them. Its bound stays valid."""
     limits = ", ".join(nonaffine_limits(setting.problem))
     chosen = Route("pyomo", "ipopt", f"the {limits} limit is active, and nonconvex")
-    local = _from_several_starts(setting, lean, clock)
+    local = from_several_starts(setting, clock)
     if local.trajectory is None and has_power_bound(setting.problem) and (found := explain_power(setting, clock)):
         text, timings = found["text"][0], clock.timings()
         status = Verdict.IMPOSSIBLE_ON_GRID
@@ -249,7 +249,7 @@ def _with_all_limits(setting: Setting, lean: Setting, attempt: Attempt, clock: C
 def _local(setting: Setting, chosen: Route, clock: Clock, start: Trajectory | None) -> Solution:
     """Ipopt from several moves within the limits that are convex; if there is none, the move is impossible."""
     problem = setting.problem
-    answer = _from_several_starts(setting, without(setting, nonaffine_limits(problem)), clock, start)
+    answer = from_several_starts(setting, clock, start)
     if answer.trajectory is None and isinstance(problem.move.time, tuple) and problem.can_wait:
         kinematic = without(setting, nonaffine_limits(problem))
         longest = convex(kinematic, problem.move.time[1], to(smoothest(problem)), clock)
@@ -281,60 +281,3 @@ def _kept(setting: Setting, chosen: Route, answer: Attempt, clock: Clock) -> Sol
             break
         answer, solution = inner, found
     return solution
-
-
-def _from_several_starts(
-    setting: Setting, lean: Setting, clock: Clock, given: Trajectory | None = None
-) -> Attempt:
-    """The best of the local optima that Ipopt finds, with a note on how many starts there were and how many agreed;
-    where a start is ``given`` and leads to one, from that alone."""
-    goal = to(setting.problem.objective)
-    found: list[Attempt] = []
-    failed: list[Attempt] = []
-    if given is not None:
-        found = [x for x in [nonconvex(setting, goal, clock, given)] if x.trajectory is not None]
-    for start in _starts(setting, lean, clock) if not found else ():
-        if start.trajectory is None:
-            failed.append(start)
-            break
-        attempt = nonconvex(setting, goal, clock, start.trajectory)
-        (failed if attempt.trajectory is None else found).append(attempt)
-        if clock.over:
-            break
-    if not found:
-        return failed[0]
-    best = min(found, key=lambda attempt: attempt.value)
-    agreed = sum(a.value <= best.value + 1e-6 * abs(best.value) for a in found)
-    return _priced(setting, replace(best, notes={"starts": len(found) + len(failed), "agreed": agreed}), clock)
-
-
-def _starts(setting: Setting, lean: Setting, clock: Clock) -> Iterator[Attempt]:
-    """Moves to start from: the smoothest, the slowest and the gentlest within the convex limits; where the duration is
-    free, the smoothest without limits at several durations."""
-    problem, duration = setting.problem, setting.problem.move.fixed_time
-    if duration is None:
-        for factor in (1.0, 1.6):
-            still = unlimited(setting, factor * _first_duration(setting))
-            yield Attempt(Outcome(Claim.OPTIMAL, "unlimited"), still)
-        return
-    peaks = (Objective(terms=(Term(minimize=x, norm=norms.Linf()),)) for x in ("velocity", "acceleration"))
-    for objective in (smoothest(problem), *peaks):
-        yield convex(lean, duration, to(objective), clock)
-
-
-def _first_duration(setting: Setting) -> float:
-    """A duration to start from, in s: the middle of the range, or somewhat more than the limits allow at least."""
-    if isinstance(setting.problem.move.time, tuple):
-        return setting.sizes.duration
-    return (1.2 if is_time_search(setting.problem) else 1.5) * setting.sizes.duration
-
-
-def _priced(setting: Setting, attempt: Attempt, clock: Clock, own: bool = False) -> Attempt:
-    """The attempt with the prices of the limits of its problem; ``own`` as for `trajopt.prices.prices`."""
-    if attempt.trajectory is None:
-        return attempt
-    since = perf_counter()
-    goal = to(setting.problem.objective)
-    found = prices(setting, attempt, goal, attempt.trajectory.duration, attempt.value, own)
-    clock.charge("prices", since)
-    return replace(attempt, notes=attempt.notes | {"prices": found})
