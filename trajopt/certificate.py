@@ -105,19 +105,42 @@ def _reach(program: ConeProgram, otherwise: float) -> Floats:
 
 def _into_dual_cone(program: ConeProgram, z: Floats) -> Floats:
     """z with every part projected onto its dual cone; equality multipliers are free."""
-    z = z.copy()
-    at = program.zero + program.nonnegative
-    np.maximum(z[program.zero : at], 0.0, out=z[program.zero : at])
+    z, (places, head, length) = _nonnegative(program, z.copy()), _tails(program, z)
+    outside = length > head
+    moved = np.where(outside, np.maximum((head + length) / 2, 0.0), head)
+    return _resized(program, z, places, moved, np.where(outside, moved / np.where(outside, length, 1.0), 1.0))
+
+
+def _under_heads(program: ConeProgram, z: Floats) -> Floats:
+    """z, in place, with no negative multipliers of inequalities, and tails of cones no longer than their heads."""
+    places, head, length = _tails(program, z)
+    head = np.maximum(head, 0.0)
+    share = np.minimum(1.0, head / np.maximum(length, 1e-300))
+    return _resized(program, _nonnegative(program, z), places, head, share)
+
+
+def _nonnegative(program: ConeProgram, z: Floats) -> Floats:
+    rows = z[program.zero : program.zero + program.nonnegative]
+    np.maximum(rows, 0.0, out=rows)
+    return z
+
+
+def _tails(program: ConeProgram, z: Floats) -> tuple[Integers, Floats, Floats]:
+    """Of every cone, where its head is, the head, and the length of the tail."""
+    if not program.cones:
+        return NONE, np.empty(0), np.empty(0)
+    first, sizes = program.zero + program.nonnegative, np.array(program.cones)
+    heads = np.cumsum(sizes) - sizes
+    squares = np.square(z[first:])
+    squares[heads] = 0.0
+    return first + heads, z[first + heads], np.sqrt(np.add.reduceat(squares, heads))
+
+
+def _resized(program: ConeProgram, z: Floats, places: Integers, head: Floats, share: Floats) -> Floats:
+    """z, in place, with other heads of cones, and shares of their tails."""
     if program.cones:
-        sizes = np.array(program.cones)
-        heads = np.cumsum(sizes) - sizes
-        tails = z[at:].copy()
-        head, tails[heads] = tails[heads], 0.0
-        length = np.sqrt(np.add.reduceat(np.square(tails), heads))
-        outside = length > head
-        moved = np.where(outside, np.maximum((head + length) / 2, 0.0), head)
-        z[at:] = tails * np.repeat(np.where(outside, moved / np.where(outside, length, 1.0), 1.0), sizes)
-        z[at + heads] = moved
+        z[program.zero + program.nonnegative :] *= np.repeat(share, program.cones)
+        z[places] = head
     return z
 
 
@@ -159,20 +182,7 @@ def _restored(
 
 
 def _weights(program: ConeProgram, z: Floats, tails: bool) -> Floats:
-    weight = np.concatenate([np.ones(program.zero), z[program.zero :] ** 2])
-    at = program.zero + program.nonnegative
-    for size in program.cones:
-        weight[at : at + size] = z[at] ** 2 if tails else 0.0
-        at += size
-    return weight
-
-
-def _under_heads(program: ConeProgram, z: Floats) -> Floats:
-    """z, in place, with no negative multipliers of inequalities, and tails of cones no longer than their heads."""
-    at = program.zero + program.nonnegative
-    np.maximum(z[program.zero : at], 0.0, out=z[program.zero : at])
-    for size in program.cones:
-        tail = z[at + 1 : at + size]
-        tail *= min(1.0, z[at] / max(float(np.linalg.norm(tail)), 1e-300))
-        at += size
-    return z
+    heads = z[_tails(program, z)[0]] if program.cones else np.empty(0)
+    of_cones = np.repeat(heads**2 if tails else 0.0 * heads, program.cones)
+    inequalities = z[program.zero : program.zero + program.nonnegative]
+    return np.concatenate([np.ones(program.zero), inequalities**2, of_cones])
