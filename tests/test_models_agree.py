@@ -11,6 +11,7 @@ import pytest
 
 import trajopt
 from tests.conftest import axis, solved, term
+from trajopt.attempt import Clock, convex, smoothest, to
 from trajopt.model_cvxpy import ConvexModel
 from trajopt.transcribe import Setting, transcribe
 
@@ -168,6 +169,33 @@ def test_piqp_gets_one_row_for_both_sides_of_a_limit(monkeypatch: pytest.MonkeyP
     found = [solved(problem).objective for problem in (limited, free)]
     assert found[0] == pytest.approx(found[1], rel=1e-9)
     assert seen[-1] == len(second)
+
+
+@pytest.mark.parametrize("first", [term("acceleration", "linf"), term("position", "l2")])
+def test_rows_that_are_built_serve_another_objective(first: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Set up once, and solved to what a program of its own gives; rows cannot be added any more."""
+    seen: list[str] = []
+
+    class Watched(piqp.SparseSolver):
+        def setup(self, **data: Any) -> None:
+            seen.append("setup")
+            super().setup(**data)
+
+        def update(self, **data: Any) -> None:
+            seen.append("update")
+            super().update(**data)
+
+    monkeypatch.setattr(piqp, "SparseSolver", Watched)
+    setting = Setting.of(axis(first.minimize, "l2", limits=LIMITS, intervals=30))
+    other = to(smoothest(setting.problem))
+    once = convex(setting, 1.0, to(trajopt.Objective(terms=(first,))), Clock(), "piqp")
+    again = convex(setting, 1.0, other, Clock(), "piqp", again=once)
+    assert seen[-1] == "update" and seen.count("setup") == 1
+    alone = convex(setting, 1.0, other, Clock(), "piqp")
+    assert again.value == pytest.approx(alone.value, rel=1e-9) and again.bound == pytest.approx(alone.bound, rel=1e-9)
+    assert again.laid is not None
+    with pytest.raises(RuntimeError, match="rows cannot be added"):
+        again.laid[1].model.nonpositive(again.laid[1].chain[1])
 
 
 @pytest.mark.parametrize("solver", ["piqp", "clarabel"])

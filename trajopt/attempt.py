@@ -63,6 +63,7 @@ class Attempt:
     size: float = 1.0  # of the objective, SI
     forgiven: float = 0.0  # see `trajopt.model.Outcome.forgiven`; SI
     convex: bool = True
+    laid: tuple[Setting, Transcript] | None = field(default=None, repr=False)  # of a convex program, for `convex`
 
     @property
     def gap(self) -> float:
@@ -83,6 +84,7 @@ def convex(
     widen_size: float = 1.0,
     enough: float = ENOUGH,
     step: bool = False,
+    again: Attempt | None = None,
 ) -> Attempt:
     """Solve a convex program at a fixed duration; ``goal`` lowers its objective. Climbs the ladder of solvers and their
     settings until a run is optimal within a gap that is ``enough`` by our own bound, or infeasible by a checked
@@ -91,6 +93,9 @@ def convex(
 
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
+
+    ``again``: an attempt at that duration whose rows are taken as they are, if they are those of this setting: a goal
+    that brings no others finds the program built.
     """
     from trajopt.convex_solvers import QUADRATIC, RESCUES
     from trajopt.model_cvxpy import ConvexModel
@@ -104,7 +109,10 @@ def convex(
         if stated is not setting.sizes:
             since, stated = perf_counter(), setting.sizes
             model = ConvexModel()
-            if widen:
+            if again is not None and again.laid is not None and again.laid[0] is setting:
+                transcript = again.laid[1]
+                model = transcript.model
+            elif widen:
                 by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0]
                 transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))
             else:
@@ -117,10 +125,10 @@ def convex(
         outcome = model.run(rung, clock.left(), np.inf if believed else enough)
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
-        attempt = _read(setting, transcript, lowered, outcome)
-        again = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
+        attempt = replace(_read(setting, transcript, lowered, outcome), laid=(setting, transcript))
+        twice = best is not None and outcome.claim is best.outcome.claim is Claim.UNBOUNDED  # once may be rounding
         accepted = believed and outcome.claim is Claim.OPTIMAL
-        if accepted or attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or again:
+        if accepted or attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or twice:
             return attempt
         bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
         if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, cast
 
 import numpy as np
 from scipy import sparse
@@ -49,38 +49,63 @@ _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do 
 }
 
 
-def run(solver: str, program: ConeProgram, seconds: float | None) -> Ended:
+def run(solver: str, program: ConeProgram, seconds: float | None, set_up: dict[str, Any]) -> Ended:
     """How a run by a rung of LADDER or ``osqp`` ended: the claim, the solver's word, its iterations, and the primal and
     dual vectors. Raises ImportError where the solver is not installed.
+
+    ``set_up``: what programs with the same rows share; solvers that can go on with another objective are kept in it.
     """
     settings = _SETTINGS[solver]
     if solver in QUADRATIC:  # PIQP knows no time limit, but takes few iterations
-        return _by_piqp(program, settings)
+        kept = set_up.get(solver)
+        if kept is None or not kept.takes(program):
+            kept = set_up[solver] = _Piqp(program, settings)
+        return cast(Ended, kept.run(program))
     limit = {} if seconds is None else {"time_limit": seconds}
     return _by_cvxpy(solver.partition("-")[0], program, settings | limit)
 
 
-def _by_piqp(program: ConeProgram, settings: dict[str, Any]) -> Ended:
-    """By PIQP's own interface: CVXPY's hands on no rows with two sides, which save it a fifth of its time."""
-    piqp: Any = import_module("piqp")
-    solver = piqp.SparseSolver()
-    for name, value in settings.items():
-        setattr(solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
-    zero, (first, second) = program.zero, program.opposite
-    upper = program.b[zero:]
-    lower, kept = np.full(len(upper), -_INFINITE), np.ones(len(upper), dtype=bool)
-    lower[first], kept[second] = -upper[second], False
-    rows = np.flatnonzero(kept)
-    equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
-    solver.setup(P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows])
-    solver.solve()
-    result = solver.result
-    at_upper, at_lower = np.zeros(len(upper)), np.zeros(len(upper))
-    at_upper[rows], at_lower[rows] = result.z_u, result.z_l
-    at_upper[second] = at_lower[first]
-    dual = np.concatenate([result.y, at_upper])
-    status = result.info.status.name
-    return _PIQP_CLAIMS.get(status, Claim.FAILED), status, result.info.iter, np.array(result.x), dual
+class _Piqp:
+    """PIQP by its own interface, set up for the rows of a program and for any objective of one sparsity.
+
+    CVXPY's interface hands on no rows with two sides, which save it a fifth of its time, and sets up for every run.
+    """
+
+    def __init__(self, program: ConeProgram, settings: dict[str, Any]) -> None:
+        piqp: Any = import_module("piqp")
+        self._solver = piqp.SparseSolver()
+        for name, value in settings.items():
+            setattr(self._solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
+        zero, (first, second) = program.zero, program.opposite
+        upper = program.b[zero:]
+        lower, kept = np.full(len(upper), -_INFINITE), np.ones(len(upper), dtype=bool)
+        lower[first], kept[second] = -upper[second], False
+        rows = self._rows = np.flatnonzero(kept)
+        equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
+        self._program = program
+        self._solver.setup(
+            P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows]
+        )
+
+    def takes(self, program: ConeProgram) -> bool:
+        """Whether a program has the same rows, and an objective of the same sparsity."""
+        known, new = self._program.P, program.P
+        same = np.array_equal(known.indptr, new.indptr) and np.array_equal(known.indices, new.indices)
+        return same and program.A is self._program.A and program.b is self._program.b
+
+    def run(self, program: ConeProgram) -> Ended:
+        """The end of a run with the objective of a program that it takes."""
+        if program is not self._program:
+            self._solver.update(P=program.P, c=program.q)
+            self._program = program
+        self._solver.solve()
+        result, (first, second) = self._solver.result, program.opposite
+        at_upper, at_lower = np.zeros((2, program.nonnegative))
+        at_upper[self._rows], at_lower[self._rows] = result.z_u, result.z_l
+        at_upper[second] = at_lower[first]
+        dual = np.concatenate([result.y, at_upper])
+        status = result.info.status.name
+        return _PIQP_CLAIMS.get(status, Claim.FAILED), status, result.info.iter, np.array(result.x), dual
 
 
 def _by_columns(A: sparse.csr_array, parts: list[Integers]) -> list[sparse.csc_array]:

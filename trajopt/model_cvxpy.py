@@ -31,6 +31,8 @@ class ConvexModel:
         self._names: dict[str, list[tuple[slice, float, Floats, Floats]]] = {}
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
+        self._sums: dict[int, tuple[Affine, Affine]] = {}  # expressions with variables of their own, by identity
+        self._set_up: dict[str, Any] = {}  # solvers that have these rows already
         self._answer: Floats | None = None
 
     def copied(self) -> ConvexModel:
@@ -57,12 +59,17 @@ class ConvexModel:
         self._asked[0].append(slice(self._count, self._count + count))
         return self._unasked(count)
 
+    def _add(self, kind: str, rows: Affine) -> slice:
+        if "_stated" in self.__dict__:
+            raise RuntimeError("rows cannot be added to a program that has been stated")
+        return self._rows[kind].add(rows)
+
     def _unasked(self, count: int) -> Affine:
         self._count += count
         return Affine.variables(self._count - count, count)
 
     def zero(self, residual: Any, size: float = 1.0) -> None:
-        self._asked[1].append(("equal", self._rows["equal"].add(Affine.of(residual) / size)))
+        self._asked[1].append(("equal", self._add("equal", Affine.of(residual) / size)))
 
     def nonpositive(self, residual: Any, size: float = 1.0, name: str = "", at: Any = None, own: Any = None) -> None:
         self._asked[1].append(("below", self._below(Affine.of(residual) / size, size, name, at, own)))
@@ -73,7 +80,7 @@ class ConvexModel:
             bound = self._unasked(len(rows))
             self._add_cones(*in_cones(rows.convex - bound))
             rows = rows.affine + bound
-        place = self._rows["below"].add(rows)
+        place = self._add("below", rows)
         if name:
             self._names.setdefault(name, []).append((place, size, at, own))
         return place
@@ -102,17 +109,25 @@ class ConvexModel:
 
     def _add_cones(self, inside: Affine, sizes: list[int]) -> slice:
         self._sizes += sizes
-        return self._rows["inside"].add(inside)
+        return self._add("inside", inside)
 
     def minimize(self, value: Any) -> None:
+        """Of the same rows, as often as one likes: only what brings rows of its own cannot follow a run."""
         value = Affine.of(value)
+        self.__dict__.pop("program", None)
         self._objective = value.affine
         for _, weights, of in value.squares:
             if len(of.rows) > len(of):  # a sum of several gets a variable of its own: OSQP stalls without
-                own = self._unasked(len(of))
-                self._rows["equal"].add(of - own)
-                of = own
+                of = self._sum(of)
             self._objective = self._objective + of.squared().total(weights)
+
+    def _sum(self, of: Affine) -> Affine:
+        """Variables that equal expressions; the same ones for the same."""
+        if id(of) not in self._sums:
+            own = self._unasked(len(of))
+            self._add("equal", of - own)
+            self._sums[id(of)] = of, own
+        return self._sums[id(of)][1]
 
     def value(self, x: Any) -> Floats:
         if not isinstance(x, Affine):
@@ -123,14 +138,21 @@ class ConvexModel:
     @cached_property
     def program(self) -> certificate.ConeProgram:
         """All that has been asked for, as the solver sees it; without the constant of the objective."""
+        P, q, self._constant = self._objective.quadratic(self._count)
+        return certificate.ConeProgram(P, q, **self._stated)
+
+    @cached_property
+    def _stated(self) -> dict[str, Any]:
+        """The rows, to which none can be added from then on."""
         opposite = _opposites(self._rows["below"].parts)
         equal, below, inside = self._rows.values()
         rows = stacked([*equal.parts, *below.parts, *(part * -1.0 for part in inside.parts)])
-        P, q, self._constant = self._objective.quadratic(self._count)
-        A = rows.matrix(self._count)
         for kind in self._rows.values():
             kind.parts = []  # the memory of large meshes
-        return certificate.ConeProgram(P, q, A, -rows.constant, equal.count, below.count, tuple(self._sizes), opposite)
+        return {
+            "A": rows.matrix(self._count), "b": -rows.constant, "zero": equal.count, "nonnegative": below.count,
+            "cones": tuple(self._sizes), "opposite": opposite,
+        }  # fmt: skip
 
     def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
@@ -140,7 +162,7 @@ class ConvexModel:
         if program.cones and name != "clarabel":
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
         try:
-            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds)
+            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds, self._set_up)
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()

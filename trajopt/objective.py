@@ -50,7 +50,14 @@ class Lowered:
 
 
 def lower(transcript: Transcript, objective: Objective) -> Lowered:
-    """The objective as a scalar expression; its rows, and those of its ceilings, go to the transcript's model."""
+    """The objective as a scalar expression; its rows, and those of its ceilings, go to the transcript's model, once."""
+    if id(objective) not in transcript.lowered:
+        transcript.lowered[id(objective)] = objective, _lower(transcript, objective)
+    found: Lowered = transcript.lowered[id(objective)][1]
+    return found
+
+
+def _lower(transcript: Transcript, objective: Objective) -> Lowered:
     model = transcript.model
     for ceiling in objective.ceilings or ():
         _hold(transcript, ceiling)

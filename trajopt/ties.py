@@ -52,7 +52,7 @@ def _with_smoothness(setting: Setting, attempt: Attempt, weight: float, clock: C
         size = max(rough.expression_value(roughness), 1e-9)
         return Lowered(cost.expression * (1 / best) + rough.expression * (weight / size), 1.0, None)
 
-    return convex(setting, attempt.trajectory.duration, goal, clock, step=True)
+    return convex(setting, attempt.trajectory.duration, goal, clock, step=True, again=attempt)
 
 
 def _costs_nothing(setting: Setting, trajectory: Trajectory, attempt: Attempt) -> bool:

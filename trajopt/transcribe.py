@@ -87,6 +87,7 @@ class Transcript:
     quantities: Quantities
     widen: Mapping[str, Any] = field(default_factory=dict)
     phased: bool = False  # whether the steps are no fixed fractions of the duration
+    lowered: dict[int, Any] = field(init=False, default_factory=dict)  # see `trajopt.objective.lower`
 
     @property
     def shares(self) -> Any:
