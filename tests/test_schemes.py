@@ -144,7 +144,7 @@ def test_the_builders_rows_hold_on_a_known_polynomial(order: int) -> None:
     assert mesh.intervals == 21
     recorder = Recorder(monomial(mesh, order))
     transcribe(Setting.of(problem), recorder, 1.0)
-    assert len(recorder.equalities) >= 3 * order
+    assert len(recorder.equalities) >= 2 * order  # of each derivative its integration and its states
     assert max(recorder.equalities) <= 1e-13
     assert max(recorder.bounds) < 0
     assert max(recorder.rows) < 0

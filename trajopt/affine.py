@@ -20,12 +20,12 @@ _CONCAVE: Final = "the square is bounded above, or its negative minimised: no co
 NONE: Final = np.empty(0, dtype=np.intp)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def _each(count: int) -> Integers:
     return np.arange(count)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)  # a program takes a hundred: frozen ones are made three times as slowly
 class Affine:
     """(n,) expressions A x + constant, with A as triplets that may repeat. A single one stands for as many as needed.
 
@@ -60,12 +60,11 @@ class Affine:
         return self.rows is _each(len(self))
 
     def __getitem__(self, key: Any) -> Affine:
+        if self._plain and not self.squares:
+            columns, values, constant = (np.atleast_1d(x[key]) for x in (self.columns, self.values, self.constant))
+            return Affine(_each(len(columns)), columns, values, constant)
         if isinstance(key, slice) and key.step is None and not self.squares:
             start, stop, _ = key.indices(len(self))
-            if stop - start == len(self):
-                return self
-            if self._plain:
-                return Affine(_each(stop - start), self.columns[key], self.values[key], self.constant[key])
             kept = (self.rows >= start) & (self.rows < stop)
             return Affine(self.rows[kept] - start, self.columns[kept], self.values[kept], self.constant[key])
         picked = np.atleast_1d(np.arange(len(self))[key])
@@ -185,8 +184,9 @@ class Affine:
 
 
 def _sum(a: Affine, b: Affine) -> Affine:
-    count = max(len(a), len(b))
-    a, b = a.broadcast(count), b.broadcast(count)
+    if len(a) != len(b):
+        count = max(len(a), len(b))
+        a, b = a.broadcast(count), b.broadcast(count)
     return Affine(
         np.concatenate([a.rows, b.rows]),
         np.concatenate([a.columns, b.columns]),

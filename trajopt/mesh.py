@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -28,10 +29,12 @@ class Mesh:
         """N."""
         return len(self.fractions) - 1
 
-    @property
+    @cached_property
     def steps(self) -> Floats:
         """(N,) interval lengths as fractions of the duration."""
-        return np.diff(self.fractions)
+        steps = np.diff(self.fractions)
+        steps.flags.writeable = False
+        return steps
 
     def places(self, top: bool) -> Floats:
         """(N+1,) the nodes or, for the top derivative, (N,) the middles of the intervals."""

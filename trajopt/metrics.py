@@ -89,7 +89,7 @@ def _drawn(trajectory: Trajectory) -> tuple[Floats, Floats]:
     points, shares = gauss(16)
     at = [(force.within(OnFloats(), s), velocity.within(OnFloats(), s)) for s in (0.0, *points, 1.0)]
     power = np.stack([motor.power(trajectory.problem.load, f, v) for f, v in at])
-    return power, shares @ power[1:-1] * np.diff(trajectory.time)
+    return power, shares @ power[1:-1] * trajectory.steps
 
 
 def peak(signal: Signal) -> float:
@@ -113,7 +113,7 @@ def rms(trajectory: Trajectory, signal: Signal) -> float:
         return float(np.sqrt(np.trapezoid(np.square(signal.nodes), trajectory.time) / trajectory.duration))
     pieces = signal.rows
     squares = np.sum(pieces * (_products(signal.degree) @ pieces), axis=0)
-    return float(np.sqrt(np.diff(trajectory.time) @ squares / trajectory.duration))
+    return float(np.sqrt(trajectory.steps @ squares / trajectory.duration))
 
 
 def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, plain: bool = False) -> float:
@@ -121,10 +121,10 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, 
     what the signal is the product of, if anything: they change sign where it does, and have a lower degree."""
     if not signal.pieces:
         x = np.abs(signal.nodes)
-        return float(np.diff(trajectory.time) @ x[:-1] if plain else np.trapezoid(x, trajectory.time))
+        return float(trajectory.steps @ x[:-1] if plain else np.trapezoid(x, trajectory.time))
     pieces = signal.rows
     total = np.abs(_integrals(trajectory, signal))
-    steps = np.diff(trajectory.time)
+    steps = trajectory.steps
     mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
     if len(mixed):
         power = _power_form(pieces[:, mixed])
@@ -146,7 +146,7 @@ def _reversals(trajectory: Trajectory, name: str) -> Floats:
 
 def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
     """(N,) the integral over each interval: its length times the mean Bernstein coefficient."""
-    integrals: Floats = np.diff(trajectory.time) * signal.rows.mean(axis=0)
+    integrals: Floats = trajectory.steps * signal.rows.mean(axis=0)
     return integrals
 
 

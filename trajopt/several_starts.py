@@ -42,6 +42,7 @@ def _on_mesh(setting: Setting, intervals: int) -> Setting:
 
 
 def best_of_starts(setting: Setting, clock: Clock) -> Attempt:
+    """The best of what comes of all starts on this mesh, with that note; without a trajectory where nothing does."""
     program = NonconvexProgram(setting, to(setting.problem.objective), clock)
     found: list[Attempt] = []
     failed: list[Attempt] = []
@@ -61,8 +62,9 @@ def best_of_starts(setting: Setting, clock: Clock) -> Attempt:
 
 
 def starts(setting: Setting, clock: Clock) -> Iterator[Attempt]:
-    """Moves to start from: the smoothest, the slowest and the gentlest within the convex limits; where the duration is
-    free, the smoothest without limits at several durations."""
+    """Moves to start from: the smoothest within the convex limits, and compromises between that and the slowest and the
+    gentlest, which alone are steps where no limit holds them; where the duration is free, the smoothest without limits
+    at several durations."""
     problem, duration = setting.problem, setting.problem.move.fixed_time
     lean = without(setting, nonaffine_limits(problem))
     if duration is None:

@@ -42,7 +42,8 @@ class Trajectory:
             values.flags.writeable = False
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "transcript"}  # made anew
+        made = ("transcript", "time", "steps")  # anew
+        return {name: value for name, value in self.__dict__.items() if name not in made}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -53,12 +54,20 @@ class Trajectory:
         """Number of the top derivative."""
         return len(self.chain) - 1
 
-    @property
+    @cached_property
     def time(self) -> Floats:
         """(N+1,) node times in s."""
         time: Floats = self.mesh.fractions * self.duration
         time[-1] = self.duration
+        time.flags.writeable = False
         return time
+
+    @cached_property
+    def steps(self) -> Floats:
+        """(N,) interval lengths in s."""
+        steps = np.diff(self.time)
+        steps.flags.writeable = False
+        return steps
 
     @cached_property
     def transcript(self) -> Transcript:

@@ -103,8 +103,9 @@ class Waypoints:
     nodes: tuple[int, ...]
     values: Any
 
-    def __getitem__(self, node: int) -> Any:
-        return self.values[self.nodes.index(node if node >= 0 else self.nodes[-1] + 1 + node)]
+    def __getitem__(self, nodes: Any) -> Any:
+        """The position at one of the nodes, which may be counted from the end, or at an array of them."""
+        return self.values[np.searchsorted(self.nodes, np.where(np.less(nodes, 0), self.nodes[-1] + 1, 0) + nodes)]
 
     def follow(self, model: Any, change: Any, size: float) -> None:
         """Demand that it grows from one of its nodes to the next by the sum of the (N,) changes."""
@@ -162,8 +163,11 @@ def lay(
             chain[i].follow(model, change, sizes.derivative[i])
         else:
             model.zero(chain[i][1:] - (chain[i][:-1] + change), sizes.derivative[i])
-    for node, i, value in prescribed(problem, mesh):
-        model.zero(chain[i][node] - value, sizes.derivative[i])
+    stated = prescribed(problem, mesh)
+    for i in range(problem.order):
+        if nodes := [node for node, j, _ in stated if j == i]:
+            values = np.array([value for _, j, value in stated if j == i])
+            model.zero(chain[i][np.array(nodes)] - values, sizes.derivative[i])
     known = setting.quantities(problem, model, scheme, mesh, sizes, chain, steps)
     return Transcript(problem, mesh, scheme, sizes, model, chain, duration, known, widen, phased)
 
@@ -233,8 +237,9 @@ def sides(problem: Problem, i: int, limit: Limit, duration: Any, fractions: Floa
     times = fractions * (duration if isinstance(duration, float) else 1.0)
     lower, upper = limit.at(times)
     origin = origin_of(problem, DERIVATIVES[i]) if i >= 0 else 0.0
-    infinite = np.full(len(fractions), np.inf)
-    return (-infinite if lower is None else lower - origin), (infinite if upper is None else upper - origin)
+    lower = np.full(len(fractions), -np.inf) if lower is None else lower
+    upper = np.full(len(fractions), np.inf) if upper is None else upper
+    return (lower - origin, upper - origin) if origin else (lower, upper)
 
 
 def origin_of(problem: Problem, name: str) -> float:
