@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from time import perf_counter
 from typing import Any, Final
 
@@ -63,7 +64,7 @@ class Attempt:
     size: float = 1.0  # of the objective, SI
     forgiven: float = 0.0  # see `trajopt.model.Outcome.forgiven`; SI
     convex: bool = True
-    laid: tuple[Setting, Transcript] | None = field(default=None, repr=False)  # of a convex program, for `convex`
+    laid: tuple[Setting, Transcript] | None = field(default=None, repr=False)  # of a convex program, with its model
 
     @property
     def gap(self) -> float:
@@ -216,8 +217,8 @@ def free_duration(setting: Setting, model: Any, start: float) -> Any:
 
 def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:
     """The Lagrangian, at the attempt's primal and dual vector, of its program with another duration."""
-    assert attempt.outcome.pair is not None and attempt.trajectory is not None
-    model = Lagrangian(attempt.outcome.pair, attempt.convex)
+    assert attempt.outcome.duals.pair is not None and attempt.trajectory is not None
+    model = Lagrangian(attempt.outcome.duals.pair, attempt.convex)
     model.minimize(goal(transcribe(replace(setting, sizes=attempt.trajectory.sizes), model, duration)).expression)
     return model.value
 
@@ -251,7 +252,12 @@ def to(objective: Objective) -> Goal:
 
 def smoothest(problem: Problem) -> Objective:
     """The L2 norm of the top derivative: strictly convex, so that its minimiser is one and the same everywhere."""
-    return Objective(terms=(Term(minimize=DERIVATIVES[problem.order], norm=norms.L2()),))
+    return _least(DERIVATIVES[problem.order])
+
+
+@cache
+def _least(name: str) -> Objective:
+    return Objective(terms=(Term(minimize=name, norm=norms.L2()),))
 
 
 def unlimited(setting: Setting, duration: float) -> Trajectory:

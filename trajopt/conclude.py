@@ -36,7 +36,7 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
         chosen = replace(chosen, solver=outcome.solver)
     if attempt.trajectory is None:
         return _unsolved(setting, chosen, attempt, clock)
-    trajectory = replace(attempt.trajectory, problem=problem)
+    trajectory = attempt.trajectory.of(problem)
     value = trajectory.measure(problem.objective)
     certificate = _certificate(setting, value, attempt)
     verdict = Verdict.SOLVED if certificate["gap"] is not None and certificate["gap"] <= GAP else Verdict.SOLVED_LOCAL

@@ -6,8 +6,10 @@ they support ``+``, ``-``, slices, and products with a scalar. All other operati
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -51,6 +53,16 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class Duals:
+    """What the multipliers say: the prices of named rows, the pair, and the Lagrangian of the program at it (NaN where
+    it is not known)."""
+
+    prices: dict[str, Prices] = field(default_factory=dict)
+    pair: Pair | None = None
+    lagrangian: float = np.nan
+
+
+@dataclass(frozen=True)
 class Outcome:
     """The end of one solver run: its claim, its own word for it, objective value, iterations and seconds."""
 
@@ -61,11 +73,14 @@ class Outcome:
     seconds: float = 0.0
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
     forgiven: float = 0.0  # what the check lets pass in the rows, times multipliers: a bound may lie so far above
-    prices: dict[str, Prices] = field(default_factory=dict)
-    pair: Pair | None = None
-    lagrangian: float = np.nan  # of the program at the pair; NaN where it is not known
+    read_duals: Callable[[], Duals] = field(default=Duals, repr=False)  # many a run is never asked for them
     solver: str = ""  # of a convex program: the one of several that this is the end of
     proof: float = 0.0  # s, of ``seconds``, that our own bound took
+
+    @cached_property
+    def duals(self) -> Duals:
+        """What the multipliers say."""
+        return self.read_duals()
 
 
 class Model(Rows, Protocol):

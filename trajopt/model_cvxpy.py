@@ -15,7 +15,7 @@ import numpy as np
 from trajopt import certificate, convex_solvers
 from trajopt.affine import NONE, Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
+from trajopt.model import Claim, Duals, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
 
 
 class ConvexModel:
@@ -180,13 +180,12 @@ class ConvexModel:
         ended = perf_counter()
         with np.errstate(over="ignore"):  # of a run that came to nothing
             forgiven = _EXCESS * float(np.abs(z).sum())
-        pair, lagrangian = self._pair(x, z, value)
         return Outcome(
             claim, status, value, iterations, ended - started, bound, forgiven,
-            self._prices(z[program.zero :]), pair, lagrangian, name, ended - solved,
+            lambda: Duals(self._prices(z[program.zero :]), *self._pair(program, x, z, value)), name, ended - solved,
         )  # fmt: skip
 
-    def _pair(self, x: Floats, z: Floats, value: float) -> tuple[Pair, float]:
+    def _pair(self, program: certificate.ConeProgram, x: Floats, z: Floats, value: float) -> tuple[Pair, float]:
         """The vectors of `trajopt.model.Pair`, from those of the program, and the Lagrangian at them; NaN without a
         value, or where variables of our own stand for squares, which they equal to a tolerance only."""
         first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
@@ -196,7 +195,7 @@ class ConvexModel:
         pair = Pair(primal, dual)
         if np.isnan(value) or len(primal) < self._count:
             return pair, np.nan
-        missed = self.program.A @ x - self.program.b
+        missed = program.A @ x - program.b
         return pair, value + sum(float(z[k] @ missed[k]) for k in places)
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:

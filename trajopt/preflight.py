@@ -215,6 +215,8 @@ def _interval(lower: float, upper: float) -> str:
 
 def at_time(limit: Limit, time: float) -> tuple[float, float]:
     """The lower and upper limit at ``time`` in s, infinite where there is none."""
+    if not limit.varies:
+        return limit.lowest, limit.highest
     lower, upper = limit.at(np.array([time]))
     return (-math.inf if lower is None else float(lower[0])), (math.inf if upper is None else float(upper[0]))
 

@@ -58,7 +58,7 @@ def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float)
 def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]]:
     """name -> (objective per SI unit of the limit, objective per unit of its own value)."""
     found: dict[str, tuple[float, float]] = {}
-    for key, rows in attempt.outcome.prices.items():
+    for key, rows in attempt.outcome.duals.prices.items():
         quantity, _, side = key.partition(".")
         symmetric = side != "at_most" and problem.limits.given[quantity].symmetric
         name, outwards = (quantity, 1.0) if symmetric else (key, -1.0 if side == "min" else 1.0)
@@ -71,12 +71,12 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
 def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float, own: bool = False) -> float | None:
     """The objective per second of duration; None where the mesh itself hangs on times in seconds."""
     problem = setting.problem
-    if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.pair is None:
+    if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.duals.pair is None:
         return None
     if any(limit.varies for limit in problem.limits.given.values()):
         return None
     later = lagrangian(setting, duration * (1 + _STEP), goal, attempt)
-    now = attempt.outcome.lagrangian if own else np.nan
+    now = attempt.outcome.duals.lagrangian if own else np.nan
     if np.isnan(now):
         now = lagrangian(setting, duration, goal, attempt)
     return attempt.slope * (later - now) / (_STEP * duration)

@@ -73,9 +73,9 @@ class Scheme:
         chain: list[Floats] = [np.empty(0)] * order + [top]
         for i in reversed(range(order)):
             change = np.zeros(len(steps))
-            for r in range(1, min(self.terms, order - i) + 1):
+            for r in reversed(range(1, min(self.terms, order - i) + 1)):  # Horner's scheme
                 left = chain[i + r] if i + r == order else chain[i + r][:-1]
-                change += steps**r / factorial(r) * left
+                change = steps / r * (left + change)
             chain[i] = start[i] + np.concatenate([[0.0], np.cumsum(change)])
         return chain
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from trajopt.attempt import Attempt, Clock, convex
+from trajopt.attempt import Attempt, Clock, convex, to
 from trajopt.lifted import Lifted
 from trajopt.mesh import Floats
 from trajopt.objective import Lowered, lower
@@ -54,16 +54,12 @@ def tighten(setting: Setting, relaxed: Attempt, value: float, clock: Clock) -> A
 
 def _relaxed(setting: Setting, reach: Reach | None, clock: Clock) -> tuple[Attempt, Floats | None]:
     """The relaxation, and by how much each lifted square lies above the square."""
-    kept: list[Transcript] = []
-
-    def goal(transcript: Transcript) -> Lowered:
-        kept[:] = [transcript]
-        return lower(transcript, setting.problem.objective)
-
-    attempt = convex(_lifted(setting, reach), setting.problem.move.fixed_time or 0.0, goal, clock)
-    if attempt.trajectory is None:
+    duration, goal = setting.problem.move.fixed_time or 0.0, to(setting.problem.objective)
+    attempt = convex(_lifted(setting, reach), duration, goal, clock)
+    if attempt.trajectory is None or attempt.laid is None:
         return attempt, None
-    speed, squares = (kept[0].model.value(x) for x in kept[0].model.lifted_squares)
+    model = attempt.laid[1].model  # of this attempt, not of one that came to nothing after it
+    speed, squares = (model.value(x) for x in model.lifted_squares)
     return attempt, squares - np.square(speed) / 2
 
 

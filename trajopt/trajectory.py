@@ -109,6 +109,10 @@ class Trajectory:
             values[DERIVATIVES[i]] = value + self.origin if i == 0 else value
         return values
 
+    def of(self, problem: Problem) -> Trajectory:
+        """The same move as an answer to another problem."""
+        return self if self.problem is problem else replace(self, problem=problem)
+
     def cut(self, times: Floats) -> Trajectory:
         """The same exact trajectory with nodes added at ``times`` (s), those of its reversals among them."""
         mesh = Mesh(np.unique(np.concatenate([self.mesh.fractions, times / self.duration])))

@@ -192,10 +192,15 @@ class FloatTwin:
             self.drawn[name, at_rest] = rows, bernstein(rows)
         return self.drawn[name, at_rest]
 
+    @cached_property
+    def velocity_rows(self) -> Array:
+        """Coefficients of velocity on the pieces of one direction."""
+        return self.rows(1, self.one_way)
+
     def loaded_rows(self, name: str, at_rest: float) -> Array:
         """Coefficients of force, of a mix of it and velocity, or of power on the pieces of one direction."""
         assert self.case.inertia is not None
-        velocity = self.rows(1, self.one_way)
+        velocity = self.velocity_rows
         if name == "power":
             return product(self.polynomial("force", at_rest)[0], velocity)
         if name != "force":
@@ -336,8 +341,17 @@ class FloatTwin:
             sum(longest**j / math.factorial(j) * peak for j, peak in enumerate(peaks[i:])) for i in range(len(peaks))
         )
 
+    @cached_property
+    def heard(self) -> dict[str, float]:
+        return {}
+
     def noise(self, name: str) -> float:
         """A generous bound on the rounding of any one value of a quantity."""
+        if name not in self.heard:
+            self.heard[name] = self._noise(name)
+        return self.heard[name]
+
+    def _noise(self, name: str) -> float:
         if not self.case.is_loaded(name):
             return 64 * EPS * self.magnitudes[DERIVATIVES.index(name)]
         assert self.case.inertia is not None
@@ -504,7 +518,7 @@ class FloatTwin:
     def flow(self, kind: str, at_rest: float) -> float:
         """The electrical energy of the move, or the energy fed back in it."""
         assert self.case.motor is not None
-        force, velocity = self.polynomial("force", at_rest)[0], self.rows(1, self.one_way)
+        force, velocity = self.polynomial("force", at_rest)[0], self.velocity_rows
         drawn, returned = both_signs(
             lambda index, s: self.drawn_power(
                 "electrical power", values_at(force, index, s), values_at(velocity, index, s)
