@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any, Final, TypeAlias, cast
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from scipy import sparse
@@ -41,6 +41,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
 RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, and not for cones: where none came near
 QUADRATIC: Final = ("piqp", "piqp-firm")  # the rungs for linear and quadratic programs
 LADDER: Final = (*QUADRATIC, "clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
+_ONCE: Final = QUADRATIC[1:]  # a second run goes on with what regularisation the first ended with: too little, here
 _INFINITE: Final = 1e30
 _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do better
     "PIQP_SOLVED": Claim.OPTIMAL,
@@ -57,10 +58,11 @@ def run(solver: str, program: ConeProgram, seconds: float | None, set_up: dict[s
     """
     settings = _SETTINGS[solver]
     if solver in QUADRATIC:  # PIQP knows no time limit, but takes few iterations
-        kept = set_up.get(solver)
-        if kept is None or not kept.takes(program):
-            kept = set_up[solver] = _Piqp(program, settings)
-        return cast(Ended, kept.run(program))
+        known: _Piqp | None = set_up.get(solver)
+        if known is None or not known.takes(program):
+            known = _Piqp(program, settings)
+            set_up |= {} if solver in _ONCE else {solver: known}
+        return known.run(program)
     limit = {} if seconds is None else {"time_limit": seconds}
     return _by_cvxpy(solver.partition("-")[0], program, settings | limit)
 
