@@ -136,7 +136,7 @@ def fastest(setting: Setting, chain: Chain, clock: Clock) -> Attempt:
     _refuse_out_of_range(setting.problem, arcs)
     trajectory = _trajectory(setting, chain, arcs)
     bound, about = _bound(setting, chain, arcs, clock)
-    notes = {"structure": _structure(arcs, bound), "bounds": about, "prices": _prices(setting.problem, arcs)}
+    notes = {"structure": _structure(arcs, bound), "bounds": about, "prices": _prices(setting.problem, chain, arcs)}
     return Attempt(Outcome(Claim.OPTIMAL, "switching times"), trajectory, arcs.duration, bound, notes=notes)
 
 
@@ -212,19 +212,34 @@ def _bound(setting: Setting, chain: Chain, arcs: Arcs, clock: Clock) -> tuple[fl
     return max(arcs.lowest, 0.0), "every move in continuous time, by enumeration of the extremals"
 
 
-def _prices(problem: Problem, arcs: Arcs) -> list[dict[str, Any]]:
-    """What each limit that the arcs run on or touch costs, by two shortest moves beside this one."""
-    found = {}
+def _prices(problem: Problem, chain: Chain, arcs: Arcs) -> list[dict[str, Any]]:
+    """What each limit that the arcs run on or touch costs, by two shortest moves beside this one.
+
+    From rest to rest one of them follows from the others. A move that takes λ times as long has limits λ^-i times as
+    large, so that Σ i·(limit)·(price) = -duration.
+    """
+    acting = {}  # name -> (its value, number of the derivative)
     met = {*arcs.active, *(name for _, name in arcs.touches)}
     for quantity, limit in problem.limits.given.items():
         known_as = "acceleration" if quantity == "force" else quantity
         sides = [side for side in ("min", "max") if f"{known_as}.{side}" in met]
         for name in [quantity] if limit.symmetric and sides else [f"{quantity}.{side}" for side in sides]:
-            now = limit.lowest if name.endswith(".min") else limit.highest
-            step = _STEP * (abs(now) or max(abs(limit.lowest), abs(limit.highest)))
-            times = [_duration(_moved(problem, name, now + way * step), arcs) for way in (1, -1)]
-            per_unit = (times[0] - times[1]) / (2 * step)
-            found[name] = (per_unit, per_unit * now)
+            acting[name] = limit.lowest if name.endswith(".min") else limit.highest, DERIVATIVES.index(known_as)
+    at_rest = not any((*chain.start[1:], *chain.end[1:])) and not problem.transcription.min_dwell
+    spared = next((name for name, (now, i) in acting.items() if at_rest and now and i), None)
+    found: dict[str, tuple[float, float]] = {}
+    for name, (now, _) in sorted(acting.items(), key=lambda item: item[0] == spared):
+        limit = problem.limits.given[name.partition(".")[0]]
+        step = _STEP * (abs(now) or max(abs(limit.lowest), abs(limit.highest)))
+        if name == spared:
+            own = -(arcs.duration + sum(acting[other][1] * found[other][1] for other in found)) / acting[name][1]
+            found[name] = (own / now, own)
+            continue
+        times = [_duration(_moved(problem, name, now + way * step), arcs) for way in (1, -1)]
+        if arcs.duration in times:  # one that is not found
+            spared = None
+        per_unit = (times[0] - times[1]) / (2 * step)
+        found[name] = (per_unit, per_unit * now)
     return ranked(problem, found, arcs.duration)
 
 
