@@ -52,6 +52,19 @@ def test_price_of_a_least_time(solver: str, model: str) -> None:
         assert price["per_percent"] == pytest.approx((more - less) / (2 * STEP) / solution.duration / 100, rel=2e-3)  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("load", [(), ('limits.force="40 N"',), ('limits.force="40 N"', 'load.coulomb="10 N"')])
+def test_prices_of_a_least_time_from_rest_to_rest(load: tuple[str, ...]) -> None:
+    """All of them, also the one that is not measured but follows from the others."""
+    problem = clemen_rupp('objective={minimize="time"}', 'move.time="free"', *load)
+    solution = trajopt.solve(problem)
+    assert solution.route.model == "arcs"
+    prices = [price for price in solution.prices if price["per_unit"]]
+    assert len(prices) >= 3
+    for price in prices:
+        more, less = (trajopt.solve(changed(problem, price["name"], 1 + s)).duration for s in (STEP, -STEP))
+        assert price["per_percent"] == pytest.approx((more - less) / (2 * STEP) / solution.duration / 100, rel=1e-4)  # type: ignore[operator]
+
+
 def changed(problem: Problem, name: str, factor: float) -> Problem:
     if name == "time":
         return problem.replace(move=problem.move.model_copy(update={"time": problem.move.fixed_time * factor}))  # type: ignore[operator]

@@ -71,6 +71,11 @@ class Attempt:
         """(value - bound)/|value|, for a value near zero over a hundred-thousandth of the objective's size."""
         return (self.value - self.bound) / max(abs(self.value), 1e-5 * self.size) if np.isfinite(self.bound) else np.inf
 
+    def rows_of(self, setting: Setting, duration: float) -> Transcript | None:
+        """The transcript of the convex program, if it is one of just this setting and duration (s)."""
+        known = self.laid
+        return known[1] if known is not None and known[0] is setting and known[1].duration == duration else None
+
 
 Goal = Callable[[Transcript], Lowered]
 
@@ -95,8 +100,8 @@ def convex(
     The sides of limits named in ``widen`` are moved outwards together, by one new nonnegative variable of size
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
 
-    ``again``: an attempt at that duration whose rows are taken as they are, if they are those of this setting: a goal
-    that brings no others finds the program built.
+    ``again``: an attempt whose rows are taken as they are, if they are those of this setting and duration: a goal that
+    brings no others finds the program built.
     """
     from trajopt.convex_solvers import QUADRATIC, RESCUES
     from trajopt.model_cvxpy import ConvexModel
@@ -110,9 +115,8 @@ def convex(
         if stated is not setting.sizes:
             since, stated = perf_counter(), setting.sizes
             model = ConvexModel()
-            if again is not None and again.laid is not None and again.laid[0] is setting:
-                transcript = again.laid[1]
-                model = transcript.model
+            if (known := None if again is None else again.rows_of(setting, duration)) is not None:
+                transcript, model = known, known.model
             elif widen:
                 by = model.vector(1, widen_size, np.zeros(1), np.full(1, np.inf), name="widening")[0]
                 transcript = transcribe(setting, model, duration, dict.fromkeys(widen, by))

@@ -182,7 +182,7 @@ def _restored(
 
 
 def _weights(program: ConeProgram, z: Floats, tails: bool) -> Floats:
-    heads = z[_tails(program, z)[0]] if program.cones else np.empty(0)
-    of_cones = np.repeat(heads**2 if tails else 0.0 * heads, program.cones)
+    heads = _tails(program, z)[1] * tails
+    of_cones = np.repeat(heads**2, program.cones)
     inequalities = z[program.zero : program.zero + program.nonnegative]
     return np.concatenate([np.ones(program.zero), inequalities**2, of_cones])

@@ -61,7 +61,8 @@ def run(solver: str, program: ConeProgram, seconds: float | None, set_up: dict[s
         known: _Piqp | None = set_up.get(solver)
         if known is None or not known.takes(program):
             known = _Piqp(program, settings)
-            set_up |= {} if solver in _ONCE else {solver: known}
+            if solver not in _ONCE:
+                set_up[solver] = known
         return known.run(program)
     limit = {} if seconds is None else {"time_limit": seconds}
     return _by_cvxpy(solver.partition("-")[0], program, settings | limit)

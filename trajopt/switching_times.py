@@ -216,7 +216,7 @@ def _prices(problem: Problem, chain: Chain, arcs: Arcs) -> list[dict[str, Any]]:
     """What each limit that the arcs run on or touch costs, by two shortest moves beside this one.
 
     From rest to rest one of them follows from the others. A move that takes λ times as long has limits λ^-i times as
-    large, so that Σ i·(limit)·(price) = -duration.
+    large, so that Σ i·(limit)·(price) = -duration; not where friction takes its part of a force.
     """
     acting = {}  # name -> (its value, number of the derivative)
     met = {*arcs.active, *(name for _, name in arcs.touches)}
@@ -225,8 +225,9 @@ def _prices(problem: Problem, chain: Chain, arcs: Arcs) -> list[dict[str, Any]]:
         sides = [side for side in ("min", "max") if f"{known_as}.{side}" in met]
         for name in [quantity] if limit.symmetric and sides else [f"{quantity}.{side}" for side in sides]:
             acting[name] = limit.lowest if name.endswith(".min") else limit.highest, DERIVATIVES.index(known_as)
-    at_rest = not any((*chain.start[1:], *chain.end[1:])) and not problem.transcription.min_dwell
-    spared = next((name for name, (now, i) in acting.items() if at_rest and now and i), None)
+    scales = not any((*chain.start[1:], *chain.end[1:], problem.transcription.min_dwell))
+    scales = scales and not (problem.load.coulomb and "force" in problem.limits.given)
+    spared = next((name for name, (now, i) in acting.items() if scales and now and i), None)
     found: dict[str, tuple[float, float]] = {}
     for name, (now, _) in sorted(acting.items(), key=lambda item: item[0] == spared):
         limit = problem.limits.given[name.partition(".")[0]]

@@ -342,14 +342,14 @@ class FloatTwin:
         )
 
     @cached_property
-    def heard(self) -> dict[str, float]:
+    def noises(self) -> dict[str, float]:
         return {}
 
     def noise(self, name: str) -> float:
         """A generous bound on the rounding of any one value of a quantity."""
-        if name not in self.heard:
-            self.heard[name] = self._noise(name)
-        return self.heard[name]
+        if name not in self.noises:
+            self.noises[name] = self._noise(name)
+        return self.noises[name]
 
     def _noise(self, name: str) -> float:
         if not self.case.is_loaded(name):
