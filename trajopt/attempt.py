@@ -221,8 +221,8 @@ def free_duration(setting: Setting, model: Any, start: float) -> Any:
 
 def lagrangian(setting: Setting, duration: float, goal: Goal, attempt: Attempt) -> float:
     """The Lagrangian, at the attempt's primal and dual vector, of its program with another duration."""
-    assert attempt.outcome.duals.pair is not None and attempt.trajectory is not None
-    model = Lagrangian(attempt.outcome.duals.pair, attempt.convex)
+    assert attempt.outcome.pair is not None and attempt.trajectory is not None
+    model = Lagrangian(attempt.outcome.pair, attempt.convex)
     model.minimize(goal(transcribe(replace(setting, sizes=attempt.trajectory.sizes), model, duration)).expression)
     return model.value
 

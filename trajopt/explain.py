@@ -216,10 +216,10 @@ def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock
 def _conflict(together: Attempt, duration: float) -> list[dict[str, Any]]:
     """When which limit stands in the way: where the certificate of the widening puts its weight."""
     conflict = []
-    weights = {name: np.abs(p.per_unit * p.own) for name, p in together.outcome.duals.prices.items() if "." in name}
+    weights = {name: np.abs(p.per_unit * p.own) for name, p in together.outcome.prices.items() if "." in name}
     largest = max((float(np.max(w)) for w in weights.values() if len(w)), default=0.0)
     for name, weight in weights.items():
-        at = together.outcome.duals.prices[name].at[weight > 1e-3 * largest] if largest else np.empty(0)
+        at = together.outcome.prices[name].at[weight > 1e-3 * largest] if largest else np.empty(0)
         if len(at):
             at = np.array([0.0, 1.0]) if name.partition(".")[0] in TOTALS else at
             conflict.append({"limit": name, "from": float(at.min() * duration), "to": float(at.max() * duration)})

@@ -36,6 +36,11 @@ class Mesh:
         steps.flags.writeable = False
         return steps
 
+    @cached_property
+    def is_uniform(self) -> bool:
+        """Whether all intervals have one length, but for rounding."""
+        return bool(np.ptp(self.steps) < 1e-12)
+
     def places(self, top: bool) -> Floats:
         """(N+1,) the nodes or, for the top derivative, (N,) the middles of the intervals."""
         return (self.fractions[:-1] + self.fractions[1:]) / 2 if top else self.fractions

@@ -53,16 +53,6 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Duals:
-    """What the multipliers say: the prices of named rows, the pair, and the Lagrangian of the program at it (NaN where
-    it is not known)."""
-
-    prices: dict[str, Prices] = field(default_factory=dict)
-    pair: Pair | None = None
-    lagrangian: float = np.nan
-
-
-@dataclass(frozen=True)
 class Outcome:
     """The end of one solver run: its claim, its own word for it, objective value, iterations and seconds."""
 
@@ -73,14 +63,20 @@ class Outcome:
     seconds: float = 0.0
     bound: float = -np.inf  # lower bound on ``value``, recomputed by us from the duals; -inf where there is none
     forgiven: float = 0.0  # what the check lets pass in the rows, times multipliers: a bound may lie so far above
-    read_duals: Callable[[], Duals] = field(default=Duals, repr=False)  # many a run is never asked for them
+    read_prices: Callable[[], dict[str, Prices]] = field(default=dict, repr=False)  # many a run is never asked for them
+    read_pair: Callable[[], Pair | None] = field(default=lambda: None, repr=False)
     solver: str = ""  # of a convex program: the one of several that this is the end of
     proof: float = 0.0  # s, of ``seconds``, that our own bound took
 
     @cached_property
-    def duals(self) -> Duals:
-        """What the multipliers say."""
-        return self.read_duals()
+    def prices(self) -> dict[str, Prices]:
+        """The prices of named rows."""
+        return self.read_prices()
+
+    @cached_property
+    def pair(self) -> Pair | None:
+        """The primal and dual vector."""
+        return self.read_pair()
 
 
 class Model(Rows, Protocol):

@@ -15,7 +15,7 @@ import numpy as np
 from trajopt import certificate, convex_solvers
 from trajopt.affine import NONE, Affine, in_cones, stacked
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Duals, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
+from trajopt.model import Claim, Floats, Integers, Outcome, Pair, Prices, finite_sides, own_size
 
 
 class ConvexModel:
@@ -182,21 +182,15 @@ class ConvexModel:
             forgiven = _EXCESS * float(np.abs(z).sum())
         return Outcome(
             claim, status, value, iterations, ended - started, bound, forgiven,
-            lambda: Duals(self._prices(z[program.zero :]), *self._pair(program, x, z, value)), name, ended - solved,
+            lambda: self._prices(z[program.zero :]), lambda: self._pair(x, z), name, ended - solved,
         )  # fmt: skip
 
-    def _pair(self, program: certificate.ConeProgram, x: Floats, z: Floats, value: float) -> tuple[Pair, float]:
-        """The vectors of `trajopt.model.Pair`, from those of the program, and the Lagrangian at them; NaN without a
-        value, or where variables of our own stand for squares, which they equal to a tolerance only."""
+    def _pair(self, x: Floats, z: Floats) -> Pair:
+        """The vectors of `trajopt.model.Pair`, from those of the program."""
         first = dict(zip(self._rows, np.cumsum([0, *(rows.count for rows in self._rows.values())]), strict=False))
         variables, rows = self._asked
         places = [slice(first[kind] + place.start, first[kind] + place.stop) for kind, place in rows]
-        primal, dual = (np.concatenate([np.empty(0), *(of[k] for k in at)]) for of, at in ((x, variables), (z, places)))
-        pair = Pair(primal, dual)
-        if np.isnan(value) or len(primal) < self._count:
-            return pair, np.nan
-        missed = program.A @ x - program.b
-        return pair, value + sum(float(z[k] @ missed[k]) for k in places)
+        return Pair(*(np.concatenate([np.empty(0), *(of[k] for k in at)]) for of, at in ((x, variables), (z, places))))
 
     def _prices(self, multipliers: Floats) -> dict[str, Prices]:
         """The prices of named rows, from the multipliers of inequalities."""

@@ -14,7 +14,7 @@ from pyomo.common.modeling import unique_component_name
 from trajopt.along import Along, curved
 from trajopt.curve import Curve
 from trajopt.errors import MissingSolver
-from trajopt.model import Claim, Duals, Floats, Outcome, Pair, Prices, finite_sides, own_size
+from trajopt.model import Claim, Floats, Outcome, Pair, Prices, finite_sides, own_size
 from trajopt.signals import Smoothed
 
 _OPTIONS: Final = {
@@ -200,9 +200,10 @@ class NonconvexModel(Smoothed):
         for variable, value in zip(nlp.get_pyomo_variables(), x, strict=True):
             variable.set_value(float(value), skip_validation=True)
         seconds = perf_counter() - started
-        duals = Duals(self._prices(nlp, info), self._pair(nlp, info["mult_g"]))
-        value = float(info["obj_val"])
-        return Outcome(claim, message, value, deadline.iterations, seconds, read_duals=lambda: duals)
+        value, prices, pair = float(info["obj_val"]), self._prices(nlp, info), self._pair(nlp, info["mult_g"])
+        return Outcome(
+            claim, message, value, deadline.iterations, seconds, read_prices=lambda: prices, read_pair=lambda: pair
+        )
 
     def _prices(self, nlp: Any, info: Any) -> dict[str, Prices]:
         """The prices of named rows and bounds, from Ipopt's multipliers."""

@@ -117,7 +117,7 @@ def _missed(relaxed: Attempt, touch: Sequence[Touch]) -> float:
     there, times its multiplier."""
     if relaxed.trajectory is None:
         return np.inf
-    rows, here = relaxed.outcome.duals.prices["squares"], Touch.at(relaxed.trajectory)
+    rows, here = relaxed.outcome.prices["squares"], Touch.at(relaxed.trajectory)
     apart = [here.middles - there.middles for there in touch] + [here.nodes - there.nodes for there in touch]
     far = np.concatenate([x[1:-1] for x in apart])[: len(rows.own)]  # nodes are squared for viscous friction only
     return relaxed.slope * float(rows.per_unit @ np.square(far / rows.own))
@@ -160,7 +160,7 @@ def _cost(objective: Objective, trajectory: Trajectory, penalty: float) -> float
 
 def _penalty(attempt: Attempt) -> float:
     """Twice the largest price of a ceiling, SI objective per part of it: enough for the penalty to be exact."""
-    rows = [rows for name, rows in attempt.outcome.duals.prices.items() if name.endswith(".at_most")]
+    rows = [rows for name, rows in attempt.outcome.prices.items() if name.endswith(".at_most")]
     return 2 * max((float(np.abs(r.per_unit @ r.own)) * attempt.slope for r in rows), default=0.0)
 
 

@@ -1,7 +1,8 @@
 """Prices: what the objective would change by if a limit, or the time, gave way a little. From the multipliers.
 
-The price of a limit is the sum of the multipliers of its rows; that of the time is the slope of the Lagrangian in the
-duration, at the same primal and dual vector (the envelope theorem).
+The price of a limit is the sum of the multipliers of its rows. That of the time follows from those where stretching a
+move in time does nothing but lower limits and terms; else it is the slope of the Lagrangian in the duration, at the
+same primal and dual vector (the envelope theorem).
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ import numpy as np
 
 from trajopt import units
 from trajopt.attempt import Attempt, Clock, Goal, lagrangian, to
-from trajopt.problem import Problem
+from trajopt.problem import Objective, Problem
+from trajopt.stretching import FALLS, is_plain, stretched_cost
+from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
 
 _STEP: Final = 1e-6  # of the duration, for the difference of the Lagrangian, which is smooth
 
 
-def priced(setting: Setting, attempt: Attempt, clock: Clock, own: bool = False) -> Attempt:
+def priced(setting: Setting, attempt: Attempt, clock: Clock) -> Attempt:
     """The attempt with a note of the prices of the limits and of the time, the most effective first; those of no effect
-    last, at zero. ``own``: it has solved just this setting's program, not one that was linearised elsewhere.
+    last, at zero.
 
     Each price: ``name`` (``jerk`` for a symmetric limit, ``velocity.max`` for a side, ``time``), ``per_unit`` (SI
     objective per SI unit of the limit), ``unit``, ``per_percent`` (relative change of the objective when it is widened
@@ -33,11 +36,12 @@ def priced(setting: Setting, attempt: Attempt, clock: Clock, own: bool = False) 
     if trajectory is None:
         return attempt
     since, duration = perf_counter(), trajectory.duration
-    found, goal = _limits(problem, attempt), to(problem.objective)
-    if (
-        problem.move.fixed_time is not None
-        and (per_second := _time(setting, attempt, goal, duration, own)) is not None
-    ):
+    found, per_second = _limits(problem, attempt), None
+    if problem.move.fixed_time is not None:
+        per_second = _by_stretching(problem, trajectory, found)
+        if per_second is None:
+            per_second = _time(setting, attempt, to(problem.objective), duration)
+    if per_second is not None:
         found["time"] = (per_second, per_second * duration)
     rows = ranked(problem, found, attempt.value)
     clock.charge("prices", since)
@@ -58,7 +62,7 @@ def time_prices(setting: Setting, attempt: Attempt, goal: Goal, duration: float)
 def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]]:
     """name -> (objective per SI unit of the limit, objective per unit of its own value)."""
     found: dict[str, tuple[float, float]] = {}
-    for key, rows in attempt.outcome.duals.prices.items():
+    for key, rows in attempt.outcome.prices.items():
         quantity, _, side = key.partition(".")
         symmetric = side != "at_most" and problem.limits.given[quantity].symmetric
         name, outwards = (quantity, 1.0) if symmetric else (key, -1.0 if side == "min" else 1.0)
@@ -68,17 +72,32 @@ def _limits(problem: Problem, attempt: Attempt) -> dict[str, tuple[float, float]
     return found
 
 
-def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float, own: bool = False) -> float | None:
+def _by_stretching(problem: Problem, trajectory: Trajectory, found: Mapping[str, tuple[float, float]]) -> float | None:
+    """The objective per second of duration, where a longer move is one within wider limits that has been stretched:
+    Σ k (limit)(its price) - Σ k (term), over the duration, with k as `trajopt.stretching` has it. None elsewhere."""
+    terms, limits = problem.objective.terms, problem.limits.given
+    scales = trajectory.scheme.terms > 1 and trajectory.mesh.is_uniform and not problem.objective.ceilings
+    named = {*limits, *(term.minimize for term in terms)}
+    if not (scales and named <= FALLS.keys() and is_plain(problem, terms)):
+        return None
+    total = 0.0
+    for name, (per_unit, _) in found.items():
+        quantity, _, side = name.partition(".")
+        limit = limits[quantity]
+        total += FALLS[quantity] * per_unit * (limit.lowest if side == "min" else limit.highest)
+    for term in terms:
+        total -= stretched_cost(term) * trajectory.measure(Objective(terms=(term,)))
+    return total / trajectory.duration
+
+
+def _time(setting: Setting, attempt: Attempt, goal: Goal, duration: float) -> float | None:
     """The objective per second of duration; None where the mesh itself hangs on times in seconds."""
     problem = setting.problem
-    if problem.move.via or len(set(np.round(setting.mesh.steps, 12))) > 1 or attempt.outcome.duals.pair is None:
+    if problem.move.via or not setting.mesh.is_uniform or attempt.outcome.pair is None:
         return None
     if any(limit.varies for limit in problem.limits.given.values()):
         return None
-    later = lagrangian(setting, duration * (1 + _STEP), goal, attempt)
-    now = attempt.outcome.duals.lagrangian if own else np.nan
-    if np.isnan(now):
-        now = lagrangian(setting, duration, goal, attempt)
+    later, now = (lagrangian(setting, at, goal, attempt) for at in (duration * (1 + _STEP), duration))
     return attempt.slope * (later - now) / (_STEP * duration)
 
 

@@ -160,7 +160,7 @@ def _convex(setting: Setting, lean: Setting, chosen: Route, clock: Clock) -> tup
     duration = setting.problem.move.fixed_time
     assert duration is not None
     solver = "osqp" if chosen.solver == "osqp" else "auto"
-    attempt = priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock, own=True)
+    attempt = priced(lean, convex(lean, duration, to(setting.problem.objective), clock, solver), clock)
     return first_solved(setting, _convex_candidates(lean, attempt, chosen, clock), clock), attempt
 
 

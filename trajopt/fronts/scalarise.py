@@ -13,15 +13,15 @@ import numpy as np
 
 from trajopt.attempt import Clock, convex, to
 from trajopt.power import relax
-from trajopt.problem import DERIVATIVES, FREE, Ceiling, Objective, Problem, Term
+from trajopt.problem import FREE, Ceiling, Objective, Problem, Term
 from trajopt.routing import has_power_bound, nonaffine_limits, route_on_mesh
 from trajopt.solution import Solution
+from trajopt.stretching import FALLS, is_plain
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting, without
 
-_OURS: Final = ("l1", "l2", "linf")
 _HELD: Final = (1e-9, 1e-8)  # relative: how closely an end of a front holds what came before; the first that it can
-_INERTIAL: Final = {"force", "power", "energy", "current", "envelope", "rms_force"}
+_FALLING: Final = ("current", "envelope", "rms_force", "time")  # by no one power, or a target itself
 
 
 @dataclass(frozen=True)
@@ -168,18 +168,12 @@ def _slopes(task: Task, solution: Solution) -> tuple[float, ...] | None:
 
 
 def stretches(problem: Problem, terms: Sequence[Term]) -> bool:
-    """Whether a move stretched in time keeps all limits and costs no more: from rest to rest, without tables, vias and
-    modes. With a load only where nothing acts but the inertia: the parts of a sum fall, but by different factors."""
-    move, limits = problem.move, problem.limits.given
-    ends = [state.fixed(problem.order) for state in (move.start, move.end)]
-    rest = all(state.get(i) == 0.0 for state in ends for i in range(1, problem.order))
+    """Whether a move stretched in time keeps all limits and costs no more."""
+    limits = problem.limits.given
     around_zero = all(x.lowest <= 0 <= x.highest for name, x in limits.items() if name != "position")
-    plain = not (move.via or problem.vibration or any(x.varies for x in limits.values()))
-    known = all(term.minimize != "position" and (term.norm is None or term.norm.name in _OURS) for term in terms)
-    named = {*limits, *(term.minimize for term in terms)} - {*DERIVATIVES, "time"}
-    load = problem.load
-    inertial = isinstance(load.inertia, float) and not (load.coulomb or load.viscous)
-    return rest and around_zero and plain and known and (not named or (inertial and named <= _INERTIAL))
+    named = {*limits, *(term.minimize for term in terms)}
+    falling = named <= {*FALLS, *_FALLING} and all(term.minimize != "position" for term in terms)
+    return is_plain(problem, terms) and around_zero and falling
 
 
 def _reweighted(task: Task, weights: Sequence[float]) -> Problem:
