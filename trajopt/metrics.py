@@ -97,8 +97,9 @@ def peak(signal: Signal) -> float:
     if not signal.pieces:
         return float(np.max(np.abs(signal.nodes)))
     pieces = signal.rows
-    best = float(np.max(np.abs(pieces[[0, -1]])))
-    doubtful = pieces[:, np.max(np.abs(pieces), axis=0) > best]  # a polynomial lies within its coefficients
+    sizes = np.abs(pieces)
+    best = float(np.max(sizes[[0, -1]]))
+    doubtful = pieces[:, np.max(sizes, axis=0) > best]  # a polynomial lies within its coefficients
     if not doubtful.size:
         return best
     power = _power_form(doubtful)
@@ -125,12 +126,14 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, 
     pieces = signal.rows
     total = np.abs(_integrals(trajectory, signal))
     steps = trajectory.steps
-    mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
+    rounding = 1e-15 * np.max(np.abs(pieces))
+    mixed = np.flatnonzero((pieces.min(axis=0) < -rounding) & (pieces.max(axis=0) > rounding))
     if len(mixed):
         power = _power_form(pieces[:, mixed])
         roots = np.concatenate([_roots_inside(_power_form(x.rows[:, mixed])) for x in factors or (signal,)])
         ends = np.concatenate([np.zeros((1, len(mixed))), np.sort(roots, axis=0), np.ones((1, len(mixed)))])
-        risen = polynomial.polyval(ends, polynomial.polyint(power)[:, None], tensor=False)
+        integral = np.concatenate([np.zeros((1, len(mixed))), power / np.arange(1, len(power) + 1)[:, None]])
+        risen = polynomial.polyval(ends, integral[:, None], tensor=False)
         total[mixed] = steps[mixed] * np.abs(np.diff(risen, axis=0)).sum(axis=0)
     return float(np.sum(total))
 
@@ -175,8 +178,10 @@ def _roots_inside(power: Floats) -> Floats:
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
-    for n in np.unique(degree[degree > 0]):
+    for n in range(1, len(power)):
         columns = np.flatnonzero(degree == n)
+        if not len(columns):
+            continue
         of = power[: n + 1, columns]
         if n <= 2:
             roots = _quadratic_roots(of)

@@ -16,7 +16,8 @@ import numpy as np
 
 from trajopt import units
 from trajopt.attempt import Attempt, Clock, Goal, lagrangian, to
-from trajopt.problem import Objective, Problem
+from trajopt.objective import Measured
+from trajopt.problem import Problem
 from trajopt.stretching import FALLS, is_plain, stretched_cost
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import Setting
@@ -86,7 +87,7 @@ def _by_stretching(problem: Problem, trajectory: Trajectory, found: Mapping[str,
         limit = limits[quantity]
         total += FALLS[quantity] * per_unit * (limit.lowest if side == "min" else limit.highest)
     for term in terms:
-        total -= stretched_cost(term) * trajectory.measure(Objective(terms=(term,)))
+        total -= stretched_cost(term) * Measured.of(trajectory.transcript, term).value
     return total / trajectory.duration
 
 

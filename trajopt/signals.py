@@ -118,7 +118,10 @@ class Signal:
     @cached_property
     def rows(self) -> NDArray[np.float64]:
         """(degree + 1, N) the pieces of a signal of floats."""
-        return np.stack(np.broadcast_arrays(*self.pieces))
+        found = np.empty((len(self.pieces), max(map(np.size, self.pieces))))
+        for row, piece in zip(found, self.pieces, strict=True):
+            row[:] = piece
+        return found
 
     def samples(self, model: Arithmetic) -> Any:
         """The values a norm sees: at the nodes, or on the intervals, or at both ends of every interval."""

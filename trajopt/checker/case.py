@@ -45,6 +45,11 @@ class Curve:
     def at(self, t: Array) -> Array:
         return np.interp(t, self.time, self.value)
 
+    def among(self, instants: list[float]) -> list[float]:
+        """The values it has at some instants (s); of a number one."""
+        found: list[float] = self.at(np.array(instants)).tolist() if len(self.value) > 1 else [self.value[0]]
+        return found
+
     def exactly(self, t: Fraction) -> Fraction:
         k = bisect_right(self.time, t)
         if k == 0 or k == len(self.time):

@@ -15,8 +15,8 @@ from trajopt.checker.polynomials import (
     bernstein,
     both_signs,
     highest,
-    mean_square,
     product,
+    square_integral,
     values_at,
 )
 from trajopt.checker.report import Found, Number, to_float
@@ -65,15 +65,20 @@ class FloatTwin:
     # dynamics
 
     @cached_property
+    def factors(self) -> list[Array]:
+        """Of the Taylor series: step^j / j!"""
+        return [self.step**j / math.factorial(j) for j in range(self.case.order + 1)]
+
+    @cached_property
     def defects(self) -> list[tuple[Array, float]]:
         """By derivative: re-integrated minus given increment of each interval, and its rounding error."""
         found = []
         for i in range(self.case.order):
             reach = 1 if self.euler else self.case.order - i
-            terms = [self.step**j / math.factorial(j) * self.left[i + j][:-1] for j in range(1, reach + 1)]
+            terms = [self.factors[j] * self.left[i + j][:-1] for j in range(1, reach + 1)]
             given = np.diff(self.left[i])  # first, so that a far-off origin costs no digits
             sizes = [float(np.abs(term).max()) for term in (*terms, given)]
-            found.append((np.sum(terms, axis=0) - given, 8 * EPS * sum(sizes)))
+            found.append((sum(terms, -given), 8 * EPS * sum(sizes)))
         return found
 
     @cached_property
@@ -86,8 +91,8 @@ class FloatTwin:
         found = [np.zeros(self.case.count + 1) for _ in range(order + 1)]
         for i in reversed(range(order)):
             reach = 1 if self.euler else order - i
-            terms = [self.step**j / math.factorial(j) * found[i + j][:-1] for j in range(1, reach + 1)]
-            found[i][1:] = np.cumsum(np.sum(terms, axis=0) + self.defects[i][0])
+            terms = [self.factors[j] * found[i + j][:-1] for j in range(1, reach + 1) if i + j < order]
+            found[i][1:] = np.cumsum(sum(terms, self.defects[i][0]))
         return found
 
     def defect(self, i: int) -> Found:
@@ -124,8 +129,10 @@ class FloatTwin:
         """The pieces, split where friction changes its direction, and where a load over position changes from one
         polynomial to the next."""
         mixed: _Pieces = self.split(np.array([*self.case.corners, *self.knots])) if self.case.splines else self.pieces
+        if not self.case.turns:
+            return mixed
         done = []
-        for _ in range(SPLITS if self.case.turns else 0):
+        for _ in range(SPLITS):
             velocity = bernstein(self.rows(1, mixed))
             whole = np.all(velocity >= -self.case.rest, axis=1) | np.all(velocity <= self.case.rest, axis=1)
             done.append(mixed.take(whole))
@@ -167,9 +174,10 @@ class FloatTwin:
                 np.sum([pieces.offset**n / math.factorial(n) * states[j + n] for n in range(order - i - j + 1)], axis=0)
                 for j in range(order - i + 1)
             ]
-        found = np.empty((len(k), len(states)))
+        found, factor = np.empty((len(k), len(states))), np.ones(len(k))
         for j, values in enumerate(states):
-            found[:, j] = pieces.length**j * values / math.factorial(j)
+            found[:, j] = factor * values
+            factor = factor * pieces.length / (j + 1)
         return found
 
     def line(self, curve: Curve, pieces: _Pieces) -> tuple[Array, Array]:
@@ -192,10 +200,14 @@ class FloatTwin:
             self.drawn[name, at_rest] = rows, bernstein(rows)
         return self.drawn[name, at_rest]
 
+    def one_way_rows(self, i: int) -> Array:
+        """Coefficients of the i-th derivative on the pieces of one direction."""
+        return self.polynomial(DERIVATIVES[i])[0] if self.one_way is self.pieces else self.rows(i, self.one_way)
+
     @cached_property
     def velocity_rows(self) -> Array:
         """Coefficients of velocity on the pieces of one direction."""
-        return self.rows(1, self.one_way)
+        return self.one_way_rows(1)
 
     def loaded_rows(self, name: str, at_rest: float) -> Array:
         """Coefficients of force, of a mix of it and velocity, or of power on the pieces of one direction."""
@@ -208,7 +220,7 @@ class FloatTwin:
             found = a * self.polynomial("force", at_rest)[0]
             found[:, : velocity.shape[1]] += b * velocity
             return found
-        inertia, acceleration = self.case.inertia, self.rows(2, self.one_way)
+        inertia, acceleration = self.case.inertia, self.one_way_rows(2)
         if self.case.splines:
             force = self.rows_along(velocity, acceleration)
             force[:, 0] += self.friction(velocity, at_rest) if self.case.coulomb else 0.0
@@ -500,12 +512,12 @@ class FloatTwin:
             return [*found, *(self.peak_between(quantity, at_rest, at_rest) for at_rest in resting)]
         length = self.pieces_of(quantity).length
         if kind == "rms":
-            squares = [mean_square(self.polynomial(quantity, at_rest)[0]) @ length for at_rest in resting]
+            squares = [square_integral(self.polynomial(quantity, at_rest)[0], length) for at_rest in resting]
             return [math.sqrt(square / self.case.end_time) for square in squares]
         if kind == "copper":
             assert self.case.motor is not None
-            squares = [mean_square(self.polynomial("current", at_rest)[0]) @ length for at_rest in resting]
-            return [self.case.motor.resistance * float(square) for square in squares]
+            squares = [square_integral(self.polynomial("current", at_rest)[0], length) for at_rest in resting]
+            return [self.case.motor.resistance * square for square in squares]
         if kind in ("drawn", "fed back"):
             return [self.flow(kind, at_rest) for at_rest in resting]
         return [absolute_integral(self.polynomial(quantity)[1], length)]

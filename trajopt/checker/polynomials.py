@@ -107,14 +107,16 @@ def _greatest(rows: Array) -> Array:
 
 def absolute_integral(rows: Array, length: Array) -> float:
     """The integral of |p| over all pieces, split where p changes its sign until its chord does for it."""
-    total, slack = 0.0, 1e-13 * np.abs(rows).max()
-    enough = 1e-13 * np.sum(length * np.max(np.abs(rows), axis=1))
+    sizes = _greatest(np.abs(rows))
+    total, slack, enough = 0.0, 1e-13 * sizes.max(), 1e-13 * float(sizes @ length)
     if not math.isfinite(enough):  # no splitting would end it
         return math.nan
-    share = np.linspace(0.0, 1.0, rows.shape[1])
+    share, mean = np.linspace(0.0, 1.0, rows.shape[1]), np.full(rows.shape[1], 1 / rows.shape[1])
     for _ in range(_ROUNDS):
         whole = (_greatest(-rows) <= slack) | (_greatest(rows) <= slack)
-        total += float(np.abs(np.mean(rows[whole], axis=1)) @ length[whole])
+        total += float((np.abs(rows @ mean) * whole) @ length)
+        if whole.all():
+            return total
         rows, length = rows[~whole], length[~whole]
         apart = rows - np.outer(rows[:, 0], 1 - share) - np.outer(rows[:, -1], share)
         if _greatest(np.abs(apart)) @ length <= enough:  # the integrals differ by no more
@@ -168,11 +170,16 @@ def values_at(rows: Array, index: Integers, s: Array) -> Array:
     return found
 
 
-def mean_square(rows: Array) -> Array:
-    """The mean of p squared over each piece, from its coefficients."""
-    powers = np.arange(rows.shape[1])
-    found: Array = np.sum(rows @ (1.0 / (np.add.outer(powers, powers) + 1)) * rows, axis=1)
-    return found
+def square_integral(rows: Array, length: Array) -> float:
+    """The integral of p squared over all pieces, from their coefficients."""
+    return float(np.sum((rows.T * length) @ rows * _mean_products(rows.shape[1])))
+
+
+@cache
+def _mean_products(count: int) -> Array:
+    """The means of products of powers of s."""
+    powers = np.arange(count)
+    return np.asarray(1.0 / (np.add.outer(powers, powers) + 1))
 
 
 # in whole numbers
@@ -293,7 +300,7 @@ def integral_exactly(rows: list[Poly], lengths: list[Fraction]) -> Fraction:
     return sum((Fraction(sum(values), unit * len(values)) * length for (values, unit), length in parts), Fraction(0))
 
 
-def square_integral(polys: list[Poly], lengths: list[Fraction]) -> Fraction:
+def square_integral_exactly(polys: list[Poly], lengths: list[Fraction]) -> Fraction:
     sums: dict[int, int] = {}  # by denominator: most pieces share one, and a gcd for each would take most of the time
     for poly, length in zip(polys, lengths, strict=True):
         values, unit = times(poly, poly)

@@ -101,9 +101,9 @@ def _position_tolerance(case: Case) -> float:
 def _limit_tolerance(case: Case, name: str, peak: float, relative: float) -> float:
     """Relative to the limit, but not more than to the signal itself: a far limit must not excuse the near one."""
     origin = float(case.signal[0][0]) if name == "position" else 0.0
-    instants = np.array([0.0, *case.corners, case.end_time])
-    sides = [side.at(instants) - origin for side in case.limits[name] if side is not None]
-    largest = max((float(np.abs(side).max()) for side in sides), default=0.0)
+    instants = [0.0, *case.corners, case.end_time]
+    sides = [side.among(instants) for side in case.limits[name] if side is not None]
+    largest = max((abs(value - origin) for side in sides for value in side), default=0.0)
     coordinate = 4 * EPS * case.largest_position if name == "position" else 0.0
     return relative * min(largest or peak, peak) + coordinate
 

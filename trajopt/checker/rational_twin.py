@@ -22,7 +22,7 @@ from trajopt.checker.polynomials import (
     integral_exactly,
     plus,
     split_at_sign,
-    square_integral,
+    square_integral_exactly,
     times,
 )
 from trajopt.checker.report import Found, Number, to_float
@@ -377,11 +377,11 @@ class RationalTwin:
             return [*found, *(self.peak_between(quantity, at_rest, at_rest) for at_rest in resting)]
         lengths = [Fraction(piece.length, self.clock) for piece in self.pieces_of(quantity)]
         if kind == "rms":
-            squares = [square_integral(self.polynomials(quantity, at_rest)[0], lengths) for at_rest in resting]
+            squares = [square_integral_exactly(self.polynomials(quantity, at_rest)[0], lengths) for at_rest in resting]
             return [_root(square / Fraction(self.case.end_time)) for square in squares]
         if kind == "copper":
             assert self.case.motor is not None
-            squares = [square_integral(self.polynomials("current", at_rest)[0], lengths) for at_rest in resting]
+            squares = [square_integral_exactly(self.polynomials("current", at_rest)[0], lengths) for at_rest in resting]
             return [Fraction(self.case.motor.resistance) * square for square in squares]
         if kind in ("drawn", "fed back"):
             return [self.flow(kind, at_rest, lengths) for at_rest in resting]
