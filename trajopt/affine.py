@@ -61,10 +61,14 @@ class Affine:
 
     def __getitem__(self, key: Any) -> Affine:
         if self._plain and not self.squares:
-            columns, values, constant = (np.atleast_1d(x[key]) for x in (self.columns, self.values, self.constant))
+            if not isinstance(key, slice):
+                key = np.atleast_1d(np.arange(len(self))[key])
+            columns, values, constant = self.columns[key], self.values[key], self.constant[key]
             return Affine(_each(len(columns)), columns, values, constant)
         if isinstance(key, slice) and key.step is None and not self.squares:
             start, stop, _ = key.indices(len(self))
+            if stop - start == len(self):
+                return self
             kept = (self.rows >= start) & (self.rows < stop)
             return Affine(self.rows[kept] - start, self.columns[kept], self.values[kept], self.constant[key])
         picked = np.atleast_1d(np.arange(len(self))[key])

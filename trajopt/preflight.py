@@ -234,7 +234,7 @@ def _doomed(problem: Problem) -> None:
     for where, here, there, direction in ends:
         for i in range(problem.order - 1):
             limits = [getattr(problem.limits, DERIVATIVES[k]) for k in (i, i + 2)]
-            if i not in here or i + 1 not in here or None in limits or any(limit.varies for limit in limits):
+            if i not in here or i + 1 not in here or any(limit is None or limit.varies for limit in limits):
                 continue
             for sign in (1.0, -1.0):  # against the upper limit, then mirrored against the lower
                 _brake(problem, where, i, here, there.get(i + 1), direction, sign)

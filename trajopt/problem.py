@@ -67,9 +67,9 @@ class State(Section):
 
     def fixed(self, order: int, default: float | None = 0.0) -> dict[int, float]:
         """The prescribed derivatives below ``order``: number of the derivative -> SI value."""
-        values = {i: getattr(self, DERIVATIVES[i]) for i in range(order)}
-        values = {i: default if x is None else x for i, x in values.items()}
-        return {i: float(x) for i, x in values.items() if x is not None and x != FREE}
+        given = (getattr(self, name) for name in DERIVATIVES[:order])
+        values = (default if x is None else x for x in given)
+        return {i: float(x) for i, x in enumerate(values) if x is not None and x != FREE}
 
 
 class Via(State):

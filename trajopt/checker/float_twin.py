@@ -23,6 +23,7 @@ from trajopt.checker.report import Found, Number, to_float
 from trajopt.checker.splines import Spline
 
 LOBATTO: Final = (0.0, (1 - 1 / math.sqrt(5)) / 2, (1 + 1 / math.sqrt(5)) / 2, 1.0)  # where a load over position ...
+_PEAK: Final = 1e-9  # relative: how closely one between the nodes is sought
 SHARES: Final = (1 / 12, 5 / 12, 5 / 12, 1 / 12)  # ... is sampled, and what share of an interval each point stands for
 
 
@@ -65,6 +66,16 @@ class FloatTwin:
     # dynamics
 
     @cached_property
+    def longest(self) -> float:
+        """The longest interval, s."""
+        return float(self.step.max())
+
+    @cached_property
+    def peaks(self) -> tuple[float, ...]:
+        """By derivative: the largest value at the nodes, or of the top one on the intervals."""
+        return tuple(float(np.abs(values).max()) for values in self.case.signal)
+
+    @cached_property
     def factors(self) -> list[Array]:
         """Of the Taylor series: step^j / j!"""
         return [self.step**j / math.factorial(j) for j in range(self.case.order + 1)]
@@ -77,8 +88,8 @@ class FloatTwin:
             reach = 1 if self.euler else self.case.order - i
             terms = [self.factors[j] * self.left[i + j][:-1] for j in range(1, reach + 1)]
             given = np.diff(self.left[i])  # first, so that a far-off origin costs no digits
-            sizes = [float(np.abs(term).max()) for term in (*terms, given)]
-            found.append((sum(terms, -given), 8 * EPS * sum(sizes)))
+            sizes = [self.longest**j / math.factorial(j) * self.peaks[i + j] for j in range(1, reach + 1)]
+            found.append((sum(terms, -given), 8 * EPS * (sum(sizes) + float(np.abs(given).max()))))
         return found
 
     @cached_property
@@ -199,6 +210,16 @@ class FloatTwin:
             rows = self.loaded_rows(name, at_rest) if loaded else self.rows(DERIVATIVES.index(name), self.pieces)
             self.drawn[name, at_rest] = rows, bernstein(rows)
         return self.drawn[name, at_rest]
+
+    @cached_property
+    def extents(self) -> dict[tuple[str, float], tuple[float, float]]:
+        return {}
+
+    def extent(self, name: str, at_rest: float = 0.0) -> tuple[float, float]:
+        """The lowest and the highest Bernstein coefficient of a quantity, which none of its values passes."""
+        if (name, at_rest) not in self.extents:
+            self.extents[name, at_rest] = _range(self.polynomial(name, at_rest)[1])
+        return self.extents[name, at_rest]
 
     def one_way_rows(self, i: int) -> Array:
         """Coefficients of the i-th derivative on the pieces of one direction."""
@@ -340,17 +361,18 @@ class FloatTwin:
 
     def peak(self, name: str) -> float:
         """How large a quantity gets, never too small; of a position the largest excursion."""
-        origin = self.case.signal[0][0] if name == "position" else 0.0
-        values = self.samples(name)[0] if self.euler else self.polynomial(name)[1]
-        return float(np.abs(values - origin).max())
+        origin = float(self.case.signal[0][0]) if name == "position" else 0.0
+        low, high = _range(self.samples(name)[0]) if self.euler else self.extent(name)
+        return max(abs(low - origin), abs(high - origin))
 
     @cached_property
     def magnitudes(self) -> tuple[float, ...]:
         """By derivative: the sum of what its polynomials are summed from, for bounds on rounding."""
-        peaks = [float(np.abs(values).max()) for values in self.case.signal]
-        longest = 0.0 if self.euler else float(self.step.max())
+        if self.euler:
+            return self.peaks
         return tuple(
-            sum(longest**j / math.factorial(j) * peak for j, peak in enumerate(peaks[i:])) for i in range(len(peaks))
+            sum(self.longest**j / math.factorial(j) * peak for j, peak in enumerate(self.peaks[i:]))
+            for i in range(len(self.peaks))
         )
 
     @cached_property
@@ -428,9 +450,11 @@ class FloatTwin:
         return Found(float(over[k]), float(time[k])) if over[k] > 0 else Found(0.0)
 
     def excess_between(self, name: str, side: int, limit: Curve, tolerance: float) -> Found:
-        rows = self.polynomial(name, -side * self.case.coulomb if self.case.is_loaded(name) else 0.0)[1]
+        at_rest, slack = -side * self.case.coulomb if self.case.is_loaded(name) else 0.0, tolerance * 1e-3
+        if len(limit.value) == 1 and side * (self.extent(name, at_rest)[side > 0] - limit.value[0]) <= slack:
+            return Found(0.0)
+        rows = self.polynomial(name, at_rest)[1]
         over = side * (rows - self.limit_rows(limit, self.pieces_of(name), rows.shape[1] - 1))
-        slack = tolerance * 1e-3
         if over.max() <= slack:
             return Found(0.0)
         value, piece, s = highest(over, slack, 0.0)
@@ -541,7 +565,15 @@ class FloatTwin:
 
     def peak_between(self, quantity: str, rest_above: float, rest_below: float) -> float:
         above, below = self.polynomial(quantity, rest_above)[1], self.polynomial(quantity, rest_below)[1]
-        return highest(np.concatenate([above, -below]), 0.0, 1e-9)[0]
+        reached = max(_range(above[:, [0, -1]])[1], -_range(below[:, [0, -1]])[0])
+        most = max(self.extent(quantity, rest_above)[1], -self.extent(quantity, rest_below)[0])
+        if most <= reached * (1 + _PEAK):
+            return reached
+        return highest(np.concatenate([above, -below]), 0.0, _PEAK)[0]
+
+
+def _range(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
 
 
 def metric_of(name: str) -> tuple[str, str]:
