@@ -19,14 +19,16 @@ Terms = tuple[tuple[str, str, float], ...]  # (quantity, norm or nothing, weight
 
 @dataclass(frozen=True)
 class Case:
-    """One objective on that axis; ``N`` intervals."""
+    """One objective on that axis, over ``distance`` (m)."""
 
     name: str
     terms: Terms
     convex: bool = True
+    distance: float = DISTANCE
 
-    def problem(self, intervals: int, distance: float = DISTANCE) -> trajopt.Problem:
+    def problem(self, intervals: int, distance: float | None = None) -> trajopt.Problem:
         """As it is asked of us."""
+        distance = self.distance if distance is None else distance
         terms = [trajopt.Term(minimize=q, norm=norm or None, weight=weight) for q, norm, weight in self.terms]
         return trajopt.Problem(
             move=trajopt.Move(time=DURATION, start=trajopt.State(position=0.0), end=trajopt.State(position=distance)),
@@ -43,7 +45,8 @@ CASES: Final = {
         Case("velocity Linf", (("velocity", "linf", 1.0),)),
         Case("acceleration Linf", (("acceleration", "linf", 1.0),)),
         Case("jerk L1", (("jerk", "l1", 1.0),)),
-        Case("jerk L2", (("jerk", "l2", 1.0),)),
+        Case("jerk L2", (("jerk", "l2", 1.0),)),  # no limit acts
+        Case("jerk L2, limited", (("jerk", "l2", 1.0),), distance=0.32),  # that of velocity does
         Case("energy", (("energy", "", 1.0),), convex=False),
         Case("power L2", (("power", "l2", 1.0),), convex=False),
         Case("power Linf", (("power", "linf", 1.0),), convex=False),

@@ -54,7 +54,7 @@ def test_solve_prints_one_json_object(move: Path) -> None:
 
 
 def test_solve_for_people_names_units_solver_and_reason(move: Path) -> None:
-    done = run("solve", move, "--timings")
+    done = run("solve", move, "--timings", "--set", "objective.norm=l1")
     assert done.returncode == 0
     spent = {line.split()[0] for line in done.stdout.splitlines() if line.endswith(" %")}
     assert spent >= {"model", "solve", "bound", "check", "total"}

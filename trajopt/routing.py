@@ -19,8 +19,9 @@ ALONE: Final = ("piqp", "osqp")  # solvers that, asked for by name, have no othe
 
 @dataclass(frozen=True)
 class Route:
-    """``model``: cvxpy, pyomo, or arcs without one; ``solver``: piqp, clarabel, osqp, ipopt, or newton on switching
-    times, as expected, and on a solution the one whose answer it is; ``reason``: one line for people."""
+    """``model``: cvxpy, pyomo, or arcs and closed form without one; ``solver``: piqp, clarabel, osqp, ipopt, newton on
+    switching times, or linear equations, as expected, and on a solution the one whose answer it is; ``reason``: one
+    line for people."""
 
     model: str
     solver: str

@@ -8,7 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
+from trajopt import closed_form
 from trajopt.attempt import ENOUGH, Attempt, Clock, convex, nonconvex, rungs, smoothest, to
+from trajopt.closed_form import smoothest_move
 from trajopt.conclude import KEPT, conclude, first_solved
 from trajopt.continuous import MassOptimum, findings, mass_optimum
 from trajopt.explain import explain_power, tested
@@ -80,6 +82,10 @@ def _solve(problem: Problem, clock: Clock, start: Trajectory | None, mass: MassO
     setting = Setting.of(problem)
     if (still := _coasting(setting)) is not None:
         solution = conclude(setting, chosen.because("coasting costs nothing: zero is optimal"), still, clock)
+        if solution.status.solved:
+            return solution
+    if (smooth := smoothest_move(setting)) is not None:
+        solution = conclude(setting, closed_form.ROUTE, smooth, clock)
         if solution.status.solved:
             return solution
     if chosen.model == "arcs":

@@ -47,9 +47,11 @@ class Opti:
         options: dict[str, Any] = {"print_time": False, "error_on_fail": True}
         opti.solver("ipopt", options, OPTIONS)
 
-    def solve(self, distance: float = DISTANCE, warm: bool = False) -> float:
-        """The objective; ``warm``: from the last answer. Raises RuntimeError where Ipopt fails."""
+    def solve(self, distance: float | None = None, warm: bool = False) -> float:
+        """The objective, over the case's own distance (m) or another; ``warm``: from the last answer. Raises
+        RuntimeError where Ipopt fails."""
         opti, (q, v, a, _) = self.opti, self.scaled
+        distance = self.case.distance if distance is None else distance
         opti.set_value(self.distance, distance)
         if warm:
             assert self.solution is not None
