@@ -48,8 +48,12 @@ class Affine:
     @classmethod
     def variables(cls, first: int, count: int) -> Affine:
         """``count`` elements of the stacked variable, from the ``first``."""
-        rows = _each(count)
-        return cls(rows, first + rows, np.ones(count), np.zeros(count))
+        return cls.each(first + _each(count), 1.0, np.zeros(count))
+
+    @classmethod
+    def each(cls, columns: Integers, factor: float, constant: Floats) -> Affine:
+        """(n,) elements of the stacked variable, times a factor, plus constants."""
+        return cls(_each(len(columns)), columns, np.full(len(columns), factor), constant)
 
     def __len__(self) -> int:
         return len(self.constant)
@@ -166,14 +170,14 @@ class Affine:
             of_rows = twice[of.rows] * of.values
             q = q + np.bincount(of.columns, of_rows * of.constant[of.rows], minlength=columns)
             constant += float(weights @ np.square(of.constant))
-            if len(np.unique(of.rows)) == len(of.rows):  # squares of single variables
+            if of._plain or len(np.unique(of.rows)) == len(of.rows):  # squares of single variables
                 diagonal += np.bincount(of.columns, of_rows * of.values, minlength=columns)
             else:
                 A = of.matrix(columns)
                 mixed.append(A.T @ (sparse.diags_array(twice) @ A))
         each = np.arange(columns + 1)  # zeros, too: so that P of one objective has the pattern of P of another
         P: Any = sparse.csc_array((diagonal, each[:-1], each), (columns, columns))
-        return sparse.csc_array(sum(mixed, P)), q, constant
+        return sparse.csc_array(sum(mixed, P)) if mixed else P, q, constant
 
     def matrix(self, columns: int) -> sparse.csr_array:
         """A, for a stacked variable of that length."""

@@ -105,7 +105,10 @@ def _reach(program: ConeProgram, otherwise: float) -> Floats:
 
 def _into_dual_cone(program: ConeProgram, z: Floats) -> Floats:
     """z with every part projected onto its dual cone; equality multipliers are free."""
-    z, (places, head, length) = _nonnegative(program, z.copy()), _tails(program, z)
+    z = _nonnegative(program, z.copy())
+    if not program.cones:
+        return z
+    places, head, length = _tails(program, z)
     outside = length > head
     moved = np.where(outside, np.maximum((head + length) / 2, 0.0), head)
     return _resized(program, z, places, moved, np.where(outside, moved / np.where(outside, length, 1.0), 1.0))

@@ -43,9 +43,7 @@ def explain(setting: Setting, clock: Clock) -> dict[str, Any]:
     found["reachable"] = _reachable(setting, clock)
     sides = _sides(setting.problem)
     found["limits"] = {name: _alone(setting, duration, name, widen, clock) for name, widen in sides.items()}
-    together = _widening(setting, duration, _nonzero(setting.problem), clock)
-    found["all_limits_factor"] = (1 + together.value) * (1 + ROUND) if np.isfinite(together.value) else None
-    found["conflict"] = _conflict(together, duration)
+    found |= _together(setting, duration, clock)
     found["text"] = _sentences(setting.problem, found)
     return found
 
@@ -213,6 +211,16 @@ def _alone(setting: Setting, duration: float, name: str, widen: list[str], clock
     return known | {"value": now + by * own * (-1 if side == "min" else 1), "factor": 1 + by if now else None}
 
 
+def _together(setting: Setting, duration: float, clock: Clock) -> dict[str, Any]:
+    """By how much all limits would have to give way together, and which of them stand in the way when."""
+    sides = _nonzero(setting.problem)
+    if not sides:
+        return {"all_limits_factor": None, "conflict": []}
+    together = _widening(setting, duration, sides, clock)
+    factor = (1 + together.value) * (1 + ROUND) if np.isfinite(together.value) else None
+    return {"all_limits_factor": factor, "conflict": _conflict(together, duration)}
+
+
 def _conflict(together: Attempt, duration: float) -> list[dict[str, Any]]:
     """When which limit stands in the way: where the certificate of the widening puts its weight."""
     conflict = []
@@ -244,6 +252,8 @@ def _sentences(problem: Problem, found: dict[str, Any]) -> list[str]:
     never = [problem.shown(name) for name, cure in found["limits"].items() if cure["never"]]
     if never:
         text.append(f"no value of {' or '.join(never)} alone is enough")
+    if not problem.limits.given:
+        text.append("there is no limit: these intervals are too few for the states; raise transcription.intervals")
     if found["all_limits_factor"]:
         text.append(f"or all limits together by {100 * (found['all_limits_factor'] - 1):.4g} %")
     for c in found["conflict"]:

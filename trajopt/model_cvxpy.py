@@ -51,7 +51,7 @@ class ConvexModel:
         sides, row_size = finite_sides(lower, upper, size)
         for side in sides:
             key, where = (f"{name}.{side.name}", at[side.at]) if at is not None else ("", None)
-            rows = x[side.at] * (side.sign / row_size) - side.limits * (side.sign / row_size)
+            rows = Affine.each(x.columns[side.at], side.sign * size / row_size, side.limits * (-side.sign / row_size))
             self._below(rows, row_size, key, where, own_size(side.limits + origin, size))
         return x
 
@@ -238,5 +238,5 @@ def _opposites(parts: list[Affine]) -> tuple[Integers, Integers]:
 
 def _are_opposite(a: Affine, b: Affine) -> bool:
     return len(a) == len(b) and all(
-        np.array_equal(x, y) for x, y in ((a.rows, b.rows), (a.columns, b.columns), (a.values, -b.values))
+        x is y or np.array_equal(x, y) for x, y in ((a.rows, b.rows), (a.columns, b.columns), (a.values, -b.values))
     )
