@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +37,33 @@ def test_a_state_outside_its_limit_by_a_rounding_is_taken_as_on_it() -> None:
     )
     assert outside.status is Verdict.SOLVED
     assert outside.objective == pytest.approx(inside.objective, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("intervals", "via"),
+    [
+        (17, ((0.0748, 1.6), (0.0946, 0.1), (0.5891, -1.2), (0.871, 0.7))),
+        (17, ((0.0748, 1.6), (0.0946, -1.1), (0.5891, -1.2), (0.871, 0.7))),
+        (5, ((0.05, -1.0), (0.067, 0.5), (0.69, 0.3), (0.83, 1.2), (0.86, -0.4))),
+    ],
+)
+def test_via_states_close_to_each_other_are_no_proof_of_impossibility(intervals: int, via: Sequence[Any]) -> None:
+    """Without limits: snaps of 1e5 times what the stroke needs by itself."""
+    states = tuple(trajopt.Via(time=time, position=position) for time, position in via)
+    auto, piqp, clarabel = (
+        trajopt.solve(axis("snap", "l2", intervals=intervals, via=states, solver=solver))
+        for solver in ("auto", "piqp", "clarabel")
+    )
+    assert auto.status is clarabel.status is Verdict.SOLVED and piqp.status in (Verdict.SOLVED, Verdict.UNDECIDED)
+    assert auto.objective == pytest.approx(clarabel.objective, rel=1e-7)
+
+
+def test_too_few_intervals_for_the_states_are_named() -> None:
+    """Without limits there is none to widen."""
+    close = tuple(trajopt.Via(time=time, position=position) for time, position in ((0.2, 1.0), (0.4, -1.0), (0.6, 1.0)))
+    solution = trajopt.solve(axis("jerk", "l2", intervals=5, via=close, end={"velocity": 3.0, "acceleration": 50.0}))
+    assert solution.status is Verdict.IMPOSSIBLE_ON_GRID and solution.explanation["conflict"] == []
+    assert "too few for the states; raise transcription.intervals" in " ".join(solution.explanation["text"])
 
 
 def test_friction_at_rest_is_no_proof_of_impossibility() -> None:

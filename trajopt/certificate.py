@@ -22,6 +22,7 @@ from trajopt.affine import NONE
 from trajopt.model import Floats, Integers
 
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
+FARTHEST: Final = 1e5  # and none of any move
 _PAID: Final = 1e-12  # of the value: what inexact stationarity may take off a bound without being mended
 _WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-16, 1e-17)))  # of `_restored`
 
@@ -73,11 +74,12 @@ def _bound(program: ConeProgram, x: Floats, z: Floats, reach: Floats) -> tuple[f
 
 
 def is_infeasible(program: ConeProgram, z: Floats) -> bool:
-    """Whether z proves that no x with |x| <= reach satisfies Ax + s = b (Farkas): b'z + reach·|A'z| < 0."""
+    """Whether z proves that no x with |x| <= reach satisfies Ax + s = b (Farkas): b'z + reach·|A'z| < 0. Here reach
+    is FARTHEST for what has no bounds: far beyond what moves within limits can be."""
     if not np.all(np.isfinite(z)) or not np.any(z):
         return False
     z = _into_dual_cone(program, z / np.max(np.abs(z)))
-    reach = _reach(program, REACH)
+    reach = _reach(program, FARTHEST)
     nothing = np.zeros(len(program.q))
     restored = _restored(replace(program, q=nothing), nothing, z, *_WAYS[0])
     return any(_separates(program, w, reach) for w in (z, *(w for _, w in restored)))

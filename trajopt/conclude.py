@@ -47,6 +47,8 @@ def conclude(setting: Setting, chosen: Route, attempt: Attempt, clock: Clock, lo
     since = perf_counter()
     report = checker.check(candidate.to_dict())
     clock.charge("check", since)
+    if report.passed and attempt.bound - value > max(1e-6 * abs(value), attempt.forgiven):
+        raise InternalError(f"lower bound {attempt.bound!r} above the answer {value!r}")
     audit, message = report.to_dict(), ""
     if not report.passed:
         message = f"{outcome.raw_status}, but the check found: {'; '.join(audit['failed'])}"
@@ -118,17 +120,12 @@ def _by_ceilings(setting: Setting, duration: float, clock: Clock) -> dict[str, A
 
 
 def _certificate(setting: Setting, value: float, attempt: Attempt) -> dict[str, Any]:
-    """Lower bound, gap and what the bound is about; for a local optimum also how many starts agreed on it.
-
-    Raises InternalError when the bound lies above the answer.
-    """
+    """Lower bound, gap and what the bound is about; for a local optimum also how many starts agreed on it."""
     starts: dict[str, Any] = {key: attempt.notes[key] for key in ("starts", "agreed") if key in attempt.notes}
     bound = attempt.bound
     if not np.isfinite(bound):
         return {"lower_bound": None, "gap": None, "bounds": "no bound known: a local optimum", **starts}
     gap = (value - bound) / max(abs(value), 1e-300)
-    if gap < -1e-6 and bound - value > attempt.forgiven:
-        raise InternalError(f"lower bound {bound!r} above the answer {value!r}")
     between = attempt.trajectory is not None and attempt.trajectory.scheme.terms > 1
     about = "every move on this mesh" + (" whose Bernstein coefficients keep the limits" if between else "")
     about = attempt.notes.get("bounds", about) + ", friction at rest as in motion" * friction.is_charged(setting)

@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, Final
 
 import numpy as np
 
 from trajopt.motor import available_force
 from trajopt.problem import DERIVATIVES, Load, Problem
+
+_FACTORS: Final = (1.0, 4.0, 16.0, 128.0, 1024.0)  # of a change over its time to the power of their index
 
 
 @dataclass(frozen=True)
@@ -58,16 +61,18 @@ class Sizes:
 def sizes_of(problem: Problem, order: int | None = None) -> Sizes:
     """The sizes of a problem: min(limit, what the stroke needs), but never below a boundary value.
 
-    The stroke needs 4 D/T, 16 D/T², 128 D/T³, 1024 D/T⁴ at most when it is comfortably feasible. A limit also bounds
-    what lies below it, by what can be gained in the duration.
+    The stroke needs 4 D/T, 16 D/T², 128 D/T³, 1024 D/T⁴ at most when it is comfortably feasible, as does the way from
+    one via state to the next in its time. A limit also bounds what lies below it, by what can be gained in the
+    duration.
     """
     order = order or problem.order
     duration = problem.move.fixed_time or _free_duration(problem)
     stroke = _stroke(problem, duration)
-    derivative = [stroke]
-    for i, factor in enumerate((4.0, 16.0, 128.0, 1024.0)[:order], 1):
+    derivative, legs = [stroke], _legs(problem, duration)
+    for i in range(1, order + 1):
         limit = min(_largest(problem, DERIVATIVES[k]) * duration ** (k - i) for k in range(i, order + 1))
-        reach = min(limit, factor * stroke / duration**i)
+        needs = (_FACTORS[i - j] * change / time ** (i - j) for j, change, time in legs if j < i)
+        reach = min(limit, max(_FACTORS[i] * stroke / duration**i, *needs, 0.0))
         derivative.append(max(reach, *(abs(x) for x in _given(problem, i)), 1e-9 * min(limit, stroke / duration**i)))
     return _of_chain(problem.load, tuple(derivative), duration)
 
@@ -114,6 +119,17 @@ def _largest_side(problem: Problem, name: str) -> float:
     limit = getattr(problem.limits, name)
     sides = () if limit is None else (abs(limit.lowest), abs(limit.highest))
     return max((side for side in sides if math.isfinite(side)), default=math.inf)
+
+
+def _legs(problem: Problem, duration: float) -> list[tuple[int, float, float]]:
+    """(derivative, its change in size, s) from each state at which it is given to the next; none without via states."""
+    move, found = problem.move, []
+    timed = [(0.0, move.start), *((via.time, via) for via in move.via), (duration, move.end)] if move.via else []
+    for i in range(problem.order):
+        given = [(t, state.fixed(i + 1, None).get(i)) for t, state in timed]
+        known = [(t, x) for t, x in given if x is not None]
+        found += [(i, abs(x - y), t - s) for (s, y), (t, x) in pairwise(known)]
+    return found
 
 
 def _stroke(problem: Problem, duration: float) -> float:
