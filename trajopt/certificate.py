@@ -69,8 +69,9 @@ def lower_bound(program: ConeProgram, x: Floats, z: Floats, wanted: float = np.i
 
 def _bound(program: ConeProgram, x: Floats, z: Floats, reach: Floats) -> tuple[float, float]:
     """The bound, and what inexact stationarity took off it."""
-    residual = float(reach @ np.abs(program.P @ x + program.q + program.A.T @ z))
-    return float(-0.5 * x @ (program.P @ x) - program.b @ z - residual), residual
+    slope = program.P @ x
+    residual = float(reach @ np.abs(slope + program.q + program.A.T @ z))
+    return float(-0.5 * x @ slope - program.b @ z - residual), residual
 
 
 def is_infeasible(program: ConeProgram, z: Floats) -> bool:

@@ -103,7 +103,7 @@ def peak(signal: Signal) -> float:
     if not doubtful.size:
         return best
     power = _power_form(doubtful)
-    slope: Floats = np.asarray(polynomial.polyder(power))
+    slope = power[1:] * np.arange(1, len(power))[:, None]
     inside = polynomial.polyval(_roots_inside(slope), power[:, None], tensor=False)
     return float(np.max(np.abs(inside), initial=best))
 
@@ -130,7 +130,7 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, 
     mixed = np.flatnonzero((pieces.min(axis=0) < -rounding) & (pieces.max(axis=0) > rounding))
     if len(mixed):
         power = _power_form(pieces[:, mixed])
-        roots = np.concatenate([_roots_inside(_power_form(x.rows[:, mixed])) for x in factors or (signal,)])
+        roots = np.concatenate([_changes(x.rows[:, mixed]) for x in factors or (signal,)])
         ends = np.concatenate([np.zeros((1, len(mixed))), np.sort(roots, axis=0), np.ones((1, len(mixed)))])
         integral = np.concatenate([np.zeros((1, len(mixed))), power / np.arange(1, len(power) + 1)[:, None]])
         risen = polynomial.polyval(ends, integral[:, None], tensor=False)
@@ -140,11 +140,17 @@ def absolute_integral(trajectory: Trajectory, signal: Signal, *factors: Signal, 
 
 def _reversals(trajectory: Trajectory, name: str) -> Floats:
     """The times at which a signal changes its sign between nodes, s."""
-    pieces = trajectory.signal(name).rows
-    time = trajectory.time
-    mixed = np.flatnonzero((pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0))
-    places = _roots_inside(_power_form(pieces[:, mixed]))
-    return np.sort((time[mixed] + places * (time[mixed + 1] - time[mixed]))[places < 1])
+    time, places = trajectory.time, _changes(trajectory.signal(name).rows)
+    return np.sort((time[:-1] + places * np.diff(time))[places < 1])
+
+
+def _changes(pieces: Floats) -> Floats:
+    """(n, m) where between 0 and 1 m polynomials in Bernstein form (n+1, m) are zero, sorted; 1 where they are not."""
+    found = np.ones((len(pieces) - 1, pieces.shape[1]))
+    mixed = (pieces.min(axis=0) < 0) & (pieces.max(axis=0) > 0)
+    if mixed.any():
+        found[:, mixed] = _roots_inside(_power_form(pieces[:, mixed]))
+    return found
 
 
 def _integrals(trajectory: Trajectory, signal: Signal) -> Floats:
@@ -175,6 +181,8 @@ def _power_form(bernstein: Floats) -> Floats:
 def _roots_inside(power: Floats) -> Floats:
     """(n, m) the roots of m polynomials (n+1, m) between 0 and 1, sorted; 1 where there are fewer. By the quadratic
     formula, of higher degrees as eigenvalues of their companions."""
+    if len(power) <= 3:
+        return _sorted_inside(_quadratic_roots(power))
     found = np.ones((len(power) - 1, power.shape[1]))
     counts = np.abs(power) > 1e-14 * np.max(np.abs(power), axis=0, initial=0.0)
     degree = np.max(np.arange(len(power))[:, None] * counts, axis=0, initial=0)
@@ -191,15 +199,20 @@ def _roots_inside(power: Floats) -> Floats:
             companion[:, :, -1] = -(of[:-1] / of[-1]).T
             complex_roots = np.linalg.eigvals(companion)
             roots = np.where(np.abs(complex_roots.imag) < 1e-9, complex_roots.real, 1.0).T
-        found[:n, columns] = np.sort(np.where((roots > 0) & (roots < 1), roots, 1.0), axis=0)
+        found[:n, columns] = _sorted_inside(roots)
     return found
 
 
+def _sorted_inside(roots: Floats) -> Floats:
+    return np.sort(np.where((roots > 0) & (roots < 1), roots, 1.0), axis=0)
+
+
 def _quadratic_roots(power: Floats) -> Floats:
-    """(n, m) the roots of polynomials (n+1, m) of degree n, one or two, without cancellation; NaN for complex ones."""
-    if len(power) == 2:
-        return np.asarray(-power[:1] / power[1])
-    c, b, a = power
+    """(n, m) the roots of polynomials (n+1, m) of degree n or less, one or two, without cancellation; infinite or NaN
+    where there are fewer."""
     with np.errstate(invalid="ignore", divide="ignore"):
+        if len(power) == 2:
+            return np.asarray(-power[:1] / power[1])
+        c, b, a = power
         larger = -(b + np.copysign(np.sqrt(b * b - 4 * a * c), b)) / 2
         return np.stack([larger / a, c / larger])

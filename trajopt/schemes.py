@@ -71,12 +71,16 @@ class Scheme:
         """The chain that follows from ``start`` (m,) and the top derivative (N,): m arrays (N+1,) and ``top``."""
         order = len(start)
         chain: list[Floats] = [np.empty(0)] * order + [top]
+        shares = [steps / r for r in range(1, min(self.terms, order) + 1)]
         for i in reversed(range(order)):
-            change = np.zeros(len(steps))
+            change: Any = 0.0
             for r in reversed(range(1, min(self.terms, order - i) + 1)):  # Horner's scheme
                 left = chain[i + r] if i + r == order else chain[i + r][:-1]
-                change = steps / r * (left + change)
-            chain[i] = start[i] + np.concatenate([[0.0], np.cumsum(change)])
+                change = shares[r - 1] * (left + change)
+            chain[i] = np.empty(len(steps) + 1)
+            chain[i][0] = 0.0
+            np.cumsum(change, out=chain[i][1:])
+            chain[i] += start[i]
         return chain
 
     def influence(self, i: int, order: int, node: int, steps: Floats) -> Floats:

@@ -23,7 +23,8 @@ from trajopt.checker.report import Found, Number, to_float
 from trajopt.checker.splines import Spline
 
 LOBATTO: Final = (0.0, (1 - 1 / math.sqrt(5)) / 2, (1 + 1 / math.sqrt(5)) / 2, 1.0)  # where a load over position ...
-_PEAK: Final = 1e-9  # relative: how closely one between the nodes is sought
+_PEAK: Final = 3e-9  # relative: how closely one between the nodes is sought
+_SUM: Final = 1e-11  # relative: how closely integrals and norms are summed
 SHARES: Final = (1 / 12, 5 / 12, 5 / 12, 1 / 12)  # ... is sampled, and what share of an interval each point stands for
 
 
@@ -510,7 +511,7 @@ class FloatTwin:
         kind, quantity = metric_of(name)
         found = self.metric_at_nodes(kind, quantity) if self.euler else self.metric_between(kind, quantity)
         span = 1.0 if kind in ("peak", "rms") else self.case.end_time
-        return [*found, self.noise(quantity) * span + 1e-12 * to_float(found[0])]
+        return [*found, self.noise(quantity) * span + (_PEAK if kind == "peak" else _SUM) * to_float(found[0])]
 
     def metric_at_nodes(self, kind: str, quantity: str) -> list[Number]:
         found: list[Number] = []
@@ -544,7 +545,7 @@ class FloatTwin:
             return [self.case.motor.resistance * square for square in squares]
         if kind in ("drawn", "fed back"):
             return [self.flow(kind, at_rest) for at_rest in resting]
-        return [absolute_integral(self.polynomial(quantity)[1], length)]
+        return [absolute_integral(self.polynomial(quantity)[1], length, _SUM / 4)]
 
     @cached_property
     def exchanged(self) -> float:

@@ -105,10 +105,11 @@ def _greatest(rows: Array) -> Array:
     return found
 
 
-def absolute_integral(rows: Array, length: Array) -> float:
-    """The integral of |p| over all pieces, split where p changes its sign until its chord does for it."""
+def absolute_integral(rows: Array, length: Array, relative: float) -> float:
+    """The integral of |p| over all pieces, split where p changes its sign until its chord does for it; to so much of
+    the integral of the largest |coefficient|."""
     sizes = _greatest(np.abs(rows))
-    total, slack, enough = 0.0, 1e-13 * sizes.max(), 1e-13 * float(sizes @ length)
+    total, slack, enough = 0.0, 1e-13 * sizes.max(), relative * float(sizes @ length)
     if not math.isfinite(enough):  # no splitting would end it
         return math.nan
     share, mean = np.linspace(0.0, 1.0, rows.shape[1]), np.full(rows.shape[1], 1 / rows.shape[1])
