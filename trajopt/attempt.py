@@ -126,6 +126,8 @@ def convex(
             lowered = goal(transcript)
             model.minimize(lowered.expression)
             clock.charge("model", since)
+        if best is not None and not model.takes(rung):
+            continue
         since, believed = perf_counter(), step and rung in QUADRATIC
         outcome = model.run(rung, clock.left(), np.inf if believed else enough)
         clock.charge("solve", since + outcome.proof)
@@ -136,7 +138,9 @@ def convex(
         if accepted or attempt.gap <= enough or outcome.claim is Claim.INFEASIBLE or twice:
             return attempt
         bound = max(attempt.bound, best.bound if best is not None else -np.inf)  # of one program, all of them
-        if best is None or (attempt.trajectory is not None and (best.trajectory is None or attempt.gap < best.gap)):
+        nothing = best is None or best.outcome.claim is Claim.FAILED  # of what failed the last one went farthest
+        closer = attempt.trajectory is not None and (best is None or best.trajectory is None or attempt.gap < best.gap)
+        if best is None or nothing or closer:
             best = attempt
         best = replace(best, bound=bound)
         if clock.over:

@@ -23,7 +23,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     # regularisation save an eighth of them; even longer ones fail at times.
     "piqp": dict.fromkeys(_PIQP_TOLERANCES, 1e-11) | {
         "max_iter": 50, "kkt_solver": "sparse_ldlt_ineq_cond", "preconditioner_iter": 3, "tau": 0.997,
-        "delta_init": 1e-6,
+        "delta_init": 1e-6, "preconditioner_scale_cost": True,
     },
     # A fifth slower, and reliable up to N = 100000, where more than this cannot be asked for; there shorter steps do
     # with fewer iterations.

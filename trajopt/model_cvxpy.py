@@ -154,12 +154,16 @@ class ConvexModel:
             "cones": tuple(self._sizes), "opposite": opposite,
         }  # fmt: skip
 
+    def takes(self, solver: str) -> bool:
+        """Whether a rung of LADDER or ``osqp`` is for programs of this kind."""
+        return not self._sizes or solver.startswith("clarabel")
+
     def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
         verified; the bound is recomputed from the duals, no closer than to a relative ``gap``, and without more effort
         where it lies ``above`` that value; a value that does not needs none then."""
         started, name, program = perf_counter(), solver.partition("-")[0], self.program
-        if program.cones and name != "clarabel":
+        if not self.takes(solver):
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
         try:
             claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds, self._set_up)
@@ -170,7 +174,7 @@ class ConvexModel:
         if name == "piqp" and seconds is not None and solved - started > seconds:
             claim = Claim.LIMIT
         if claim is Claim.INFEASIBLE and not certificate.is_infeasible(program, z):
-            claim = Claim.FAILED
+            claim, status = Claim.FAILED, f"{status}, by a proof that does not hold"
         if claim in (Claim.OPTIMAL, Claim.INACCURATE):
             self._answer, constant = x, self._constant
             value = program.value(x) + constant

@@ -13,7 +13,7 @@ from trajopt.schemes import Scheme
 from trajopt.trajectory import Trajectory
 from trajopt.transcribe import node_limits, prescribed
 
-_ROUNDING: Final = 1e-15  # of a condition, over its size: no correction comes closer
+_ROUNDING: Final = 1e-14  # of a condition, over its size: corrections hardly come closer
 
 
 def rebuild(
@@ -35,12 +35,12 @@ def rebuild(
     lower, upper = node_limits(problem, problem.order, mesh, duration)
     top = np.clip(top, lower, upper)
     order = problem.order
-    effects = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
     chain = scheme.rollout(start, top, steps)
     for _ in range(2):  # the second pass removes the rounding of the first
         miss = np.array([(value - chain[i][node]) / sizes.derivative[i] for node, i, value in conditions])
         if np.max(np.abs(miss), initial=0.0) <= _ROUNDING:
             break
+        effects = np.array([scheme.influence(i, order, node, steps) / sizes.derivative[i] for node, i, _ in conditions])
         top = top + _correction(effects, miss, np.minimum(upper - top, top - lower) / sizes.derivative[order])
         chain = scheme.rollout(start, top, steps)
     for node, i, value in conditions:

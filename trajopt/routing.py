@@ -47,7 +47,7 @@ def route(problem: Problem | PlantProblem | AxesProblem) -> Route:
     if not isinstance(problem, Problem):
         return _of_another_kind(problem)
     wanted = problem.transcription.solver
-    if wanted == "auto" and as_chain(_lean(problem)) is not None:
+    if wanted == "auto" and problem.move.fixed_time is None and as_chain(_lean(problem)) is not None:
         return Route("arcs", "newton", "minimum time of a chain of integrators: its switching times, exactly")
     return route_on_mesh(problem)
 
