@@ -9,6 +9,7 @@ import pytest
 
 import trajopt
 from tests.conftest import axis, solved
+from trajopt.problem import DERIVATIVES
 
 LIMITS = {"velocity": (0.0, 2.5), "acceleration": 8.0, "jerk": 100.0}
 CASES: dict[str, dict[str, Any]] = {
@@ -77,3 +78,26 @@ def test_states_that_contradict_each_other() -> None:
     """Two positions at via states too close to pass both within the limits are left to the program, which says why."""
     via = (trajopt.Via(time=0.5, position=0.5), trajopt.Via(time=0.5000001, position=0.6))
     assert not trajopt.solve(case("rest to rest", via=via)).status.solved
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_states(seed: int) -> None:
+    """Moving ends and up to five via states, without limits: solved, and as by the program."""
+    rng = np.random.default_rng(seed)
+    order, time, distance = int(rng.integers(2, 5)), 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-6, 4)
+    size = (distance, distance / time, distance / time**2)
+
+    def state() -> dict[str, Any]:
+        return {name: rng.normal() * size[i] for i, name in enumerate(("velocity", "acceleration")[: order - 1], 1)}
+
+    at = np.cumsum(rng.uniform(0.02, 0.2, rng.integers(0, 6)))
+    via = tuple(trajopt.Via(time=t * time, position=rng.normal() * distance) for t in at[at < 0.97])
+    ends = {"start": state(), "end": state()}
+    closed, program = (
+        solved(
+            axis(DERIVATIVES[order], "l2", distance=distance, time=time, via=via, intervals=40, solver=solver, **ends)
+        )
+        for solver in ("auto", "clarabel")
+    )
+    assert closed.objective == pytest.approx(program.objective, rel=1e-7)
+    assert closed.certificate["lower_bound"] <= program.objective * (1 + 1e-9)
