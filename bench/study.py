@@ -22,7 +22,7 @@ def cases(count: int) -> plan.Plan:
     ]
     problem = {
         "move": {"time": "0.5 s", "end": {"position": "100 mm"}},
-        "limits": {"velocity": ["0 m/s", "0.36 m/s"], "jerk": "100 m/s^3"},
+        "limits": {"velocity": ["0 m/s", "0.45 m/s"], "jerk": "100 m/s^3"},
         "load": {"mass": "2 kg"},
         "objective": {"minimize": "jerk", "norm": "l2"},
         "transcription": {"intervals": 40},

@@ -84,7 +84,9 @@ def _solve(problem: Problem, clock: Clock, start: Trajectory | None, mass: MassO
         solution = conclude(setting, chosen.because("coasting costs nothing: zero is optimal"), still, clock)
         if solution.status.solved:
             return solution
+    since = perf_counter()
     if (smooth := smoothest_move(setting)) is not None:
+        clock.charge("closed form", since)
         solution = conclude(setting, closed_form.ROUTE, smooth, clock)
         if solution.status.solved:
             return solution
