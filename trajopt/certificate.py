@@ -24,6 +24,7 @@ from trajopt.model import Floats, Integers
 REACH = 1e3  # or ten times the largest value found: no scaled variable of an optimal move is assumed to be larger
 FARTHEST: Final = 1e5  # and none of any move
 _PAID: Final = 1e-12  # of the value: what inexact stationarity may take off a bound without being mended
+_MANY: Final = 5000  # rows of a system
 _WAYS: Final = ((1e-13, False), *((ridge, True) for ridge in (1e-13, 1e-15, 1e-16, 1e-17)))  # of `_restored`
 
 
@@ -170,8 +171,9 @@ def _restored(
     if moving:
         regular = regular + program.P
     K = sparse.csc_array(sparse.block_array([[regular, A.T], [A, -sparse.diags_array(1 / weight[rows])]]))
+    order = "MMD_AT_PLUS_A" if K.shape[0] < _MANY else "COLAMD"  # less fill; its own time grows with the square
     try:
-        factors = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = splu(K, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError:  # nothing to factorise: the bound stays valid, only looser
         return
     for _ in range(4):
