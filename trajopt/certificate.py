@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from scipy import sparse
@@ -171,7 +171,8 @@ def _restored(
     if moving:
         regular = regular + program.P
     K = sparse.csc_array(sparse.block_array([[regular, A.T], [A, -sparse.diags_array(1 / weight[rows])]]))
-    order = "MMD_AT_PLUS_A" if K.shape[0] < _MANY else "COLAMD"  # less fill; its own time grows with the square
+    order: Literal["MMD_AT_PLUS_A", "COLAMD"]
+    order = "MMD_AT_PLUS_A" if K.shape[0] < _MANY else "COLAMD"  # less fill; but its own time grows with the square
     try:
         factors = splu(K, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError:  # nothing to factorise: the bound stays valid, only looser
