@@ -58,6 +58,17 @@ def test_via_states_close_to_each_other_are_no_proof_of_impossibility(intervals:
     assert auto.objective == pytest.approx(clarabel.objective, rel=1e-7)
 
 
+def test_the_last_solver_out_of_iterations_is_no_limit_of_the_user() -> None:
+    """The jerk rings where hardly anything limits it: no solver comes near."""
+    time, distance = 0.0020514241481960583, 3.074883650159047e-06
+    via = (trajopt.Via(time=0.0007029870076552056, position=-2.216372912147409e-06),)
+    end, limits = {"velocity": -0.0014370740376889752}, {"snap": 173622831010388.72}
+    solution = trajopt.solve(
+        axis("velocity", "l2", intervals=200, time=time, distance=distance, via=via, end=end, limits=limits)
+    )
+    assert solution.status in (Verdict.UNDECIDED, Verdict.SOLVED)
+
+
 def test_too_few_intervals_for_the_states_are_named() -> None:
     """Without limits there is none to widen."""
     close = tuple(trajopt.Via(time=time, position=position) for time, position in ((0.2, 1.0), (0.4, -1.0), (0.6, 1.0)))
