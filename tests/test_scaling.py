@@ -9,6 +9,7 @@ import pytest
 
 import trajopt
 from tests.conftest import axis, solved, term
+from trajopt.scaling import sizes_of
 
 METRES = {"nm": 1e-9, "mm": 1e-3, "km": 1e3}  # factor on every length
 SECONDS = {"ms": 1e-3, "ks": 1e3}  # factor on every time
@@ -174,3 +175,11 @@ def test_five_thousand_intervals(name: str) -> None:
     assert fine.certificate["gap"] <= 1e-6
     assert fine.objective <= coarse.objective * (1 + 3e-8)
     assert fine.objective == pytest.approx(coarse.objective, rel=2e-4)
+
+
+def test_a_start_left_out_is_scaled_as_the_zero_it_means() -> None:
+    """The way from it to a via state close by asks for as much."""
+    via = (trajopt.Via(time=0.02, position=0.9),)
+    stated, implied = (axis("jerk", "l2", via=via, start={"position": start}) for start in (0.0, None))
+    assert sizes_of(implied) == sizes_of(stated)
+    assert sizes_of(stated).derivative[1] == pytest.approx(4 * 0.9 / 0.02)

@@ -124,9 +124,10 @@ def _largest_side(problem: Problem, name: str) -> float:
 def _legs(problem: Problem, duration: float) -> list[tuple[int, float, float]]:
     """(derivative, its change in size, s) from each state at which it is given to the next; none without via states."""
     move, found = problem.move, []
-    timed = [(0.0, move.start), *((via.time, via) for via in move.via), (duration, move.end)] if move.via else []
+    via = [(state.time, state, None) for state in move.via]
+    timed = [(0.0, move.start, 0.0), *via, (duration, move.end, 0.0)] if via else []
     for i in range(problem.order):
-        given = [(t, state.fixed(i + 1, None).get(i)) for t, state in timed]
+        given = [(t, state.fixed(i + 1, default).get(i)) for t, state, default in timed]
         known = [(t, x) for t, x in given if x is not None]
         found += [(i, abs(x - y), t - s) for (s, y), (t, x) in pairwise(known)]
     return found

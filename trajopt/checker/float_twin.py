@@ -566,7 +566,7 @@ class FloatTwin:
 
     def peak_between(self, quantity: str, rest_above: float, rest_below: float) -> float:
         above, below = self.polynomial(quantity, rest_above)[1], self.polynomial(quantity, rest_below)[1]
-        reached = max(_range(above[:, [0, -1]])[1], -_range(below[:, [0, -1]])[0])
+        reached = max(_range(above[:, [0, -1]])[1], -_range(below[:, [0, -1]])[0], 0.0)  # below it friction holds
         most = max(self.extent(quantity, rest_above)[1], -self.extent(quantity, rest_below)[0])
         if most <= reached * (1 + _PEAK):
             return reached
