@@ -129,7 +129,7 @@ def convex(
         if best is not None and not model.takes(rung):
             continue
         since, believed = perf_counter(), step and rung in QUADRATIC
-        outcome = model.run(rung, clock.left(), np.inf if believed else enough)
+        outcome = model.run(rung, clock.left(), np.inf if believed else enough, near=again is not None)
         clock.charge("solve", since + outcome.proof)
         clock.charge("bound", perf_counter() - outcome.proof)
         attempt = replace(_read(setting, transcript, lowered, outcome), laid=(setting, transcript))

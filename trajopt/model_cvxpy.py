@@ -158,15 +158,19 @@ class ConvexModel:
         """Whether a rung of LADDER or ``osqp`` is for programs of this kind."""
         return not self._sizes or solver.startswith("clarabel")
 
-    def run(self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf) -> Outcome:
+    def run(
+        self, solver: str, seconds: float | None = None, gap: float = 0.0, above: float = np.inf, near: bool = False
+    ) -> Outcome:
         """Solve by a rung of LADDER or ``osqp``. The claim is the solver's, but an infeasible one has been
         verified; the bound is recomputed from the duals, no closer than to a relative ``gap``, and without more effort
-        where it lies ``above`` that value; a value that does not needs none then."""
+        where it lies ``above`` that value; a value that does not needs none then. ``near``: the answer of the last
+        run, which kept the same rows, is probably close."""
         started, name, program = perf_counter(), solver.partition("-")[0], self.program
         if not self.takes(solver):
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
+        before = self._answer if near else None
         try:
-            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds, self._set_up)
+            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds, self._set_up, before)
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()
