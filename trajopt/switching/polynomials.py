@@ -27,17 +27,17 @@ class Audit:
         return self.residual < TOLERANCE and self.excess < TOLERANCE
 
 
+def value(state: State, top: float, time: float, derivative: int) -> float:
+    """A derivative after a time of an arc."""
+    n, found = len(state), top
+    for k in range(n - 1, derivative - 1, -1):
+        found = state[k] + found * time / (k + 1 - derivative)
+    return found
+
+
 def advance(state: State, top: float, duration: float) -> State:
     """The state after an arc."""
-    coefficients = (*state, top)
-    n = len(state)
-    out = []
-    for i in range(n):
-        value = coefficients[n]
-        for k in range(n - 1, i - 1, -1):
-            value = coefficients[k] + value * duration / (k + 1 - i)
-        out.append(value)
-    return tuple(out)
+    return tuple(value(state, top, duration, i) for i in range(len(state)))
 
 
 def states(start: State, tops: Sequence[float], durations: Sequence[float]) -> list[State]:
@@ -59,8 +59,8 @@ def instants(state: State, top: float, duration: float, derivative: int) -> list
 
 def extremes(state: State, top: float, duration: float, derivative: int) -> tuple[float, float]:
     """(least, greatest) value of a derivative over an arc."""
-    times = [0.0, duration, *instants(state, top, duration, derivative + 1)]
-    values = [advance(state, top, t)[derivative] for t in times]
+    times = [duration, *instants(state, top, duration, derivative + 1)]
+    values = [state[derivative], *(value(state, top, t, derivative) for t in times)]
     return min(values), max(values)
 
 

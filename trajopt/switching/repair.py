@@ -9,7 +9,7 @@ from math import sqrt
 from trajopt.switching.chain import NAMES, Chain
 from trajopt.switching.chatter import Chattering, chattering
 from trajopt.switching.coarse import Sketch, Touch
-from trajopt.switching.polynomials import advance, instants, states
+from trajopt.switching.polynomials import instants, states, value
 from trajopt.switching.ramps import Piece
 from trajopt.switching.stationary import Condition
 
@@ -62,7 +62,7 @@ def _peaks(chain: Chain, sketch: Sketch, derivative: int) -> Iterator[tuple[int,
     borders = states((0.0, *chain.start[1:]), tops, durations)
     for k, (state, top, duration) in enumerate(zip(borders, tops, durations, strict=False)):
         for t in (*instants(state, top, duration, derivative + 1), duration):
-            yield k, t, advance(state, top, t)[derivative]
+            yield k, t, value(state, top, t, derivative)
 
 
 @dataclass(frozen=True)
