@@ -47,17 +47,6 @@ class ConeProgram:
         """The objective at x."""
         return float(0.5 * x @ (self.P @ x) + self.q @ x)
 
-    def with_rows(self, rows: Integers) -> ConeProgram:
-        """The program with some of its rows only, in order: all of the equalities, and none that belong to cones."""
-        place = np.full(len(self.b), -1)
-        place[rows] = np.arange(len(rows))
-        first, second = (place[self.zero + side] for side in self.opposite)
-        both = (first >= 0) & (second >= 0)
-        return replace(
-            self, A=self.A[rows], b=self.b[rows], nonnegative=len(rows) - self.zero, cones=(),
-            opposite=(first[both] - self.zero, second[both] - self.zero),
-        )  # fmt: skip
-
 
 def lower_bound(program: ConeProgram, x: Floats, z: Floats, wanted: float = np.inf) -> float:
     """A lower bound on the optimal value from a primal and a dual vector, both possibly inexact; -inf if not finite.

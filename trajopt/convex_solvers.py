@@ -10,11 +10,13 @@ from types import SimpleNamespace
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from trajopt.certificate import ConeProgram
 from trajopt.model import Claim, Floats, Integers
 
+Booleans: TypeAlias = NDArray[np.bool_]
 Ended: TypeAlias = tuple[Claim, str, int, Floats, Floats]  # the claim, the solver's word, iterations, x and z
 _CLARABEL: Final = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
 _PIQP_TOLERANCES: Final = ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel")
@@ -43,7 +45,7 @@ QUADRATIC: Final = ("piqp", "piqp-firm")  # the rungs for linear and quadratic p
 LADDER: Final = (*QUADRATIC, "clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
 _ONCE: Final = QUADRATIC[1:]  # a second run goes on with what regularisation the first ended with: too little, here
 _INFINITE: Final = 1e30
-_MANY: Final = 4000  # rows: a program of fewer is solved as fast as it is set up without those far from an answer
+_MANY: Final = 2000  # rows: a program of fewer is solved as fast as it is set up without those far from an answer
 _FAR: Final = 0.3  # of a row, which has size one
 _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do better
     "PIQP_SOLVED": Claim.OPTIMAL,
@@ -77,15 +79,11 @@ def run(
 
 def _run_near(program: ConeProgram, settings: dict[str, Any], x: Floats) -> Ended | None:
     """The optimum without the inequalities from which x is far; None where it does not keep those as well."""
-    far = program.b - program.A @ x > _FAR
-    far[: program.zero] = False
-    part = program.with_rows(rows := np.flatnonzero(~far))
-    claim, status, iterations, found, z = _Piqp(part, settings).run(part)
-    if claim is not Claim.OPTIMAL or np.any((program.A @ found > program.b)[far]):
-        return None
-    dual = np.zeros(len(program.b))
-    dual[rows] = z
-    return claim, status, iterations, found, dual
+    far = (program.b - program.A @ x)[program.zero :] > _FAR
+    ended = _Piqp(program, settings, far).run(program)
+    claim, found = ended[0], ended[3]
+    keeps = claim is Claim.OPTIMAL and np.all((program.A @ found <= program.b)[program.zero :][far])
+    return ended if keeps else None
 
 
 class _Piqp:
@@ -94,15 +92,18 @@ class _Piqp:
     CVXPY's interface hands on no rows with two sides, which save it a fifth of its time, and sets up for every run.
     """
 
-    def __init__(self, program: ConeProgram, settings: dict[str, Any]) -> None:
+    def __init__(self, program: ConeProgram, settings: dict[str, Any], without: Booleans | None = None) -> None:
+        """``without``: (n,) inequalities that are left out."""
         piqp: Any = import_module("piqp")
         self._solver = piqp.SparseSolver()
         for name, value in settings.items():
             setattr(self._solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
         zero, (first, second) = program.zero, program.opposite
-        upper = program.b[zero:]
-        lower, kept = np.full(len(upper), -_INFINITE), np.ones(len(upper), dtype=bool)
-        lower[first], kept[second] = -upper[second], False
+        upper = program.b[zero:] if without is None else np.where(without, _INFINITE, program.b[zero:])
+        lower = np.full(len(upper), -_INFINITE)
+        lower[first] = -upper[second]
+        kept = (upper < _INFINITE) | (lower > -_INFINITE)
+        kept[second] = False
         rows = self._rows = np.flatnonzero(kept)
         equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
         self._program = program
