@@ -185,24 +185,23 @@ def test_a_tie_broken_near_the_first_optimum_is_the_one_of_all_rows(
 ) -> None:
     problem = table_i(name, norm, intervals=1000)
     near = solved(problem)
-    monkeypatch.setattr(convex_solvers, "_MANY", 10**9)
+    monkeypatch.setattr(convex_solvers, "_FAR", np.inf)
     full = solved(problem)
     assert near.objective == pytest.approx(full.objective, rel=1e-9)
     for ours, theirs in zip(near.trajectory.chain[:3], full.trajectory.chain[:3], strict=True):
         assert np.max(np.abs(ours - theirs)) <= 1e-4 * np.max(np.abs(theirs))
 
 
-def test_rows_far_from_a_point_count_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_far_from_a_point_count_as_well() -> None:
     """min x² - 6x + y² within x <= 1, x + y = 2: from x = 0 the limit is far, and without it x is 2.5."""
-    monkeypatch.setattr(convex_solvers, "_MANY", 0)
     A = sparse.csr_array([[1.0, 1.0], [1.0, 0.0], [0.0, -1.0]])
     program = ConeProgram(sparse.csc_array(2 * np.eye(2)), np.array([-6.0, 0.0]), A, np.array([2.0, 1.0, 9.0]), 1, 2)
     for rung in convex_solvers.QUADRATIC:
-        claim, _, _, x, z = convex_solvers.run(rung, program, None, {}, near=np.array([0.0, 2.0]))
+        claim, _, _, x, z = convex_solvers.run(rung, program, None, near=np.array([0.0, 2.0]))
         assert claim is Claim.OPTIMAL
         assert x == pytest.approx([1.0, 1.0], abs=1e-7)
         assert z == pytest.approx([-2.0, 6.0, 0.0], abs=1e-6)
-        claim, _, _, x, z = convex_solvers.run(rung, program, None, {}, near=np.array([1.0, 1.0]))
+        claim, _, _, x, z = convex_solvers.run(rung, program, None, near=np.array([1.0, 1.0]))
         assert (claim, x) == (Claim.OPTIMAL, pytest.approx([1.0, 1.0], abs=1e-7))
         assert z == pytest.approx([-2.0, 6.0, 0.0], abs=1e-6)
 

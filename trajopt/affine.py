@@ -175,8 +175,8 @@ class Affine:
             else:
                 A = of.matrix(columns)
                 mixed.append(A.T @ (sparse.diags_array(twice) @ A))
-        each = np.arange(columns + 1)  # zeros, too: so that P of one objective has the pattern of P of another
-        P: Any = sparse.csc_array((diagonal, each[:-1], each), (columns, columns))
+        at = np.flatnonzero(diagonal)
+        P: Any = sparse.csc_array((diagonal[at], at, np.searchsorted(at, np.arange(columns + 1))), (columns, columns))
         return sparse.csc_array(sum(mixed, P)) if mixed else P, q, constant
 
     def matrix(self, columns: int) -> sparse.csr_array:

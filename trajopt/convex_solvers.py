@@ -43,9 +43,7 @@ _SETTINGS: Final[dict[str, dict[str, Any]]] = {
 RESCUES: Final = ("clarabel-faer", "osqp-last")  # another factorisation; slow, and not for cones: where none came near
 QUADRATIC: Final = ("piqp", "piqp-firm")  # the rungs for linear and quadratic programs
 LADDER: Final = (*QUADRATIC, "clarabel", "clarabel-firm", "clarabel-soft", *RESCUES)
-_ONCE: Final = QUADRATIC[1:]  # a second run goes on with what regularisation the first ended with: too little, here
 _INFINITE: Final = 1e30
-_MANY: Final = 2000  # rows: a program of fewer is solved as fast as it is set up without those far from an answer
 _FAR: Final = 0.3  # of a row, which has size one
 _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do better
     "PIQP_SOLVED": Claim.OPTIMAL,
@@ -54,82 +52,53 @@ _PIQP_CLAIMS: Final = {  # out of iterations is a failure: the next rung may do 
 }
 
 
-def run(
-    solver: str, program: ConeProgram, seconds: float | None, set_up: dict[str, Any], near: Floats | None = None
-) -> Ended:
+def run(solver: str, program: ConeProgram, seconds: float | None, near: Floats | None = None) -> Ended:
     """How a run by a rung of LADDER or ``osqp`` ended: the claim, the solver's word, its iterations, and the primal and
     dual vectors. Raises ImportError where the solver is not installed.
 
-    ``set_up``: what programs with the same rows share; solvers that can go on with another objective are kept in it.
     ``near``: an x that keeps all rows, and to which the answer is probably close.
     """
     settings = _SETTINGS[solver]
     if solver in QUADRATIC:  # PIQP knows no time limit, but takes few iterations
-        if near is not None and len(program.b) > _MANY and (ended := _run_near(program, settings, near)) is not None:
-            return ended
-        known: _Piqp | None = set_up.get(solver)
-        if known is None or not known.takes(program):
-            known = _Piqp(program, settings)
-            if solver not in _ONCE:
-                set_up[solver] = known
-        return known.run(program)
+        ended = None if near is None else _near(program, settings, near)
+        return _by_piqp(program, settings) if ended is None else ended
     limit = {} if seconds is None else {"time_limit": seconds}
     return _by_cvxpy(solver.partition("-")[0], program, settings | limit)
 
 
-def _run_near(program: ConeProgram, settings: dict[str, Any], x: Floats) -> Ended | None:
+def _near(program: ConeProgram, settings: dict[str, Any], x: Floats) -> Ended | None:
     """The optimum without the inequalities from which x is far; None where it does not keep those as well."""
     far = (program.b - program.A @ x)[program.zero :] > _FAR
-    ended = _Piqp(program, settings, far).run(program)
+    ended = _by_piqp(program, settings, far)
     claim, found = ended[0], ended[3]
     keeps = claim is Claim.OPTIMAL and np.all((program.A @ found <= program.b)[program.zero :][far])
     return ended if keeps else None
 
 
-class _Piqp:
-    """PIQP by its own interface, set up for the rows of a program and for any objective of one sparsity.
-
-    CVXPY's interface hands on no rows with two sides, which save it a fifth of its time, and sets up for every run.
-    """
-
-    def __init__(self, program: ConeProgram, settings: dict[str, Any], without: Booleans | None = None) -> None:
-        """``without``: (n,) inequalities that are left out."""
-        piqp: Any = import_module("piqp")
-        self._solver = piqp.SparseSolver()
-        for name, value in settings.items():
-            setattr(self._solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
-        zero, (first, second) = program.zero, program.opposite
-        upper = program.b[zero:] if without is None else np.where(without, _INFINITE, program.b[zero:])
-        lower = np.full(len(upper), -_INFINITE)
-        lower[first] = -upper[second]
-        kept = (upper < _INFINITE) | (lower > -_INFINITE)
-        kept[second] = False
-        rows = self._rows = np.flatnonzero(kept)
-        equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
-        self._program = program
-        self._solver.setup(
-            P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows]
-        )
-
-    def takes(self, program: ConeProgram) -> bool:
-        """Whether a program has the same rows, and an objective of the same sparsity."""
-        known, new = self._program.P, program.P
-        same = np.array_equal(known.indptr, new.indptr) and np.array_equal(known.indices, new.indices)
-        return same and program.A is self._program.A and program.b is self._program.b
-
-    def run(self, program: ConeProgram) -> Ended:
-        """The end of a run with the objective of a program that it takes."""
-        if program is not self._program:
-            self._solver.update(P=program.P, c=program.q)
-            self._program = program
-        self._solver.solve()
-        result, (first, second) = self._solver.result, program.opposite
-        at_upper, at_lower = np.zeros((2, program.nonnegative))
-        at_upper[self._rows], at_lower[self._rows] = result.z_u, result.z_l
-        at_upper[second] = at_lower[first]
-        dual = np.concatenate([result.y, at_upper])
-        status = result.info.status.name
-        return _PIQP_CLAIMS.get(status, Claim.FAILED), status, result.info.iter, np.array(result.x), dual
+def _by_piqp(program: ConeProgram, settings: dict[str, Any], without: Booleans | None = None) -> Ended:
+    """PIQP by its own interface: CVXPY's hands on no rows with two sides, which save it a fifth of its time.
+    ``without``: (n,) inequalities that are left out."""
+    piqp: Any = import_module("piqp")
+    solver = piqp.SparseSolver()
+    for name, value in settings.items():
+        setattr(solver.settings, name, getattr(piqp.KKTSolver, value) if name == "kkt_solver" else value)
+    zero, (first, second) = program.zero, program.opposite
+    upper = program.b[zero:] if without is None else np.where(without, _INFINITE, program.b[zero:])
+    lower = np.full(len(upper), -_INFINITE)
+    lower[first] = -upper[second]
+    kept = (upper < _INFINITE) | (lower > -_INFINITE)
+    kept[second] = False
+    rows = np.flatnonzero(kept)
+    equal, within = _by_columns(program.A, [np.arange(zero), zero + rows])
+    solver.setup(P=program.P, c=program.q, A=equal, b=program.b[:zero], G=within, h_l=lower[rows], h_u=upper[rows])
+    solver.solve()
+    result = solver.result
+    at_upper, at_lower = np.zeros((2, program.nonnegative))
+    at_upper[rows], at_lower[rows] = result.z_u, result.z_l
+    at_upper[second] = at_lower[first]
+    dual = np.concatenate([result.y, at_upper])
+    status = result.info.status.name
+    return _PIQP_CLAIMS.get(status, Claim.FAILED), status, result.info.iter, np.array(result.x), dual
 
 
 def _by_columns(A: sparse.csr_array, parts: list[Integers]) -> list[sparse.csc_array]:

@@ -32,7 +32,6 @@ class ConvexModel:
         self._objective = Affine.of(0.0)
         self._constant = 0.0  # of the objective, which the program leaves out
         self._sums: dict[int, tuple[Affine, Affine]] = {}  # expressions with variables of their own, by identity
-        self._set_up: dict[str, Any] = {}  # solvers that have these rows already
         self._answer: Floats | None = None
 
     def copied(self) -> ConvexModel:
@@ -168,9 +167,10 @@ class ConvexModel:
         started, name, program = perf_counter(), solver.partition("-")[0], self.program
         if not self.takes(solver):
             return Outcome(Claim.FAILED, f"{solver} does not take cone programs")
-        before = self._answer if near else None
         try:
-            claim, status, iterations, x, z = convex_solvers.run(solver, program, seconds, self._set_up, before)
+            claim, status, iterations, x, z = convex_solvers.run(
+                solver, program, seconds, self._answer if near else None
+            )
         except ImportError as missing:
             raise MissingSolver(f"{name} is not installed; 'pip install {name}' or 'make demo' brings it") from missing
         solved = perf_counter()
