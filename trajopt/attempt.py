@@ -158,7 +158,7 @@ def rounding(mesh: Mesh) -> float:
 
 def rungs(setting: Setting) -> Sequence[str]:
     """The solvers and settings that a program goes to in turn: those of PIQP or Clarabel where asked for, else all; on
-    a large mesh without the first, which fails there."""
+    a large mesh without the first, which often fails there."""
     from trajopt.convex_solvers import LADDER, QUADRATIC
 
     own = {"piqp": QUADRATIC, "clarabel": tuple(rung for rung in LADDER if rung not in QUADRATIC)}

@@ -57,7 +57,7 @@ def lower_bound(program: ConeProgram, x: Floats, z: Floats, wanted: float = np.i
     z = _into_dual_cone(program, z)
     best, unpaid = _bound(program, x, z, reach)
     enough = _PAID * abs(program.value(x))
-    for ridge, moving in _WAYS:
+    for ridge, moving in _WAYS[1:] + _WAYS[:1] if program.P.nnz else _WAYS:  # what is curved is best met by moving x
         if unpaid <= enough or best > wanted:
             break
         for y, w in _restored(program, x, z, ridge, moving):

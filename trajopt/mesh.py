@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trajopt.fields import Table
 from trajopt.problem import Problem
 
-LARGE: Final = 10_000  # intervals: beyond, memory counts, and solvers take firmer settings
+LARGE: Final = 4_000  # intervals: beyond, memory counts, and solvers take firmer settings
 
 Floats = NDArray[np.float64]
 
