@@ -23,11 +23,13 @@ _OPTIONS: Final = {
     "compl_inf_tol": 1e-11,  # the default of 1e-4 leaves peaks 1e-5 too high
     "acceptable_tol": 1e-8,
     "bound_relax_factor": 0.0,  # the default lets variables leave their bounds by 1e-8
-    "mumps_pivot_order": 4,  # PORD: the default took 51 s instead of 0.7 s on a model with one dense column
     "max_iter": 3000,
     "print_level": 0,
     "sb": "yes",
 }
+# Orderings of MUMPS. Measured: with one dense column its own takes 51 s where PORD takes 0.7 s; for several axes SCOTCH
+# takes a half to a tenth of PORD's time, and for one axis of a thousand intervals up to ten times as long.
+_PORD, _SCOTCH = 4, 3
 RUNGS: Final[dict[str, dict[str, Any]]] = {  # other ways through the barrier: each may end in another local optimum
     "ipopt": {},
     "ipopt-adaptive": {"mu_strategy": "adaptive"},
@@ -46,11 +48,13 @@ _CLAIMS: Final = {  # all others, local infeasibility among them, are failures: 
 
 
 class NonconvexModel(Smoothed):
-    """A nonlinear program under construction; see `trajopt.model.Model` for the meaning of the methods."""
+    """A nonlinear program under construction; see `trajopt.model.Model` for the meaning of the methods.
+    ``coupled``: of several axes."""
 
     convex = False
 
-    def __init__(self) -> None:
+    def __init__(self, coupled: bool = False) -> None:
+        self._options = _OPTIONS | {"mumps_pivot_order": _SCOTCH if coupled else _PORD}
         self._model = pyo.ConcreteModel()
         self._model.rows = pyo.ConstraintList()
         self._vectors: list[tuple[Any, Any, float]] = []
@@ -191,7 +195,7 @@ class NonconvexModel(Smoothed):
         for along in self._curves:
             along.start(self.value(along.position))
         nlp, problem, deadline = self._interface(seconds)
-        for option, setting in (_OPTIONS | RUNGS[solver]).items():
+        for option, setting in (self._options | RUNGS[solver]).items():
             problem.add_option(option, setting)
         x, info = problem.solve(np.array([x.value or 0.0 for x in nlp.get_pyomo_variables()]))
         status = int(info["status"])

@@ -35,7 +35,7 @@ class AxesProgram:
         from trajopt.model_pyomo import NonconvexModel
 
         since = perf_counter()
-        self._setting, self._clock, self._model = setting, clock, NonconvexModel()
+        self._setting, self._clock, self._model = setting, clock, NonconvexModel(coupled=True)
         duration, self._free = setting.problem.fixed_time, None
         if duration is None:
             self._free = free_duration(setting.axes[0], self._model, setting.axes[0].sizes.duration)
