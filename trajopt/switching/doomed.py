@@ -17,6 +17,8 @@ def refuse_doomed(chain: Chain) -> None:
             if not low - _slack(low, x) <= x <= high + _slack(high, x):
                 raise Impossible(f"the {NAMES[i]} at the {name} is {x:g}, outside its limits {low:g} to {high:g}")
     for when, ahead, turned in (("after the start", chain, 1.0), ("before the end", chain.reversed(), -1.0)):
+        if not any(ahead.start[1:]):  # at rest nothing has to change
+            continue
         for side, way in ((ahead, 1.0), (ahead.mirrored(), -1.0)):
             for i in range(chain.order - 1):
                 limit, reached = side.limits[i][1], _unavoidable(side, i)
