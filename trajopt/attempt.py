@@ -101,7 +101,7 @@ def convex(
     ``widen_size`` (see `trajopt.transcribe.transcribe`).
 
     ``again``: an attempt whose rows are taken as they are, if they are those of this setting and duration: a goal that
-    brings no others finds the program built.
+    brings no others finds the program built. Its answer is taken to be near: rows far from it are left out first.
     """
     from trajopt.convex_solvers import QUADRATIC, RESCUES
     from trajopt.model_cvxpy import ConvexModel
